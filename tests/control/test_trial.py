@@ -16,7 +16,7 @@ from annelid.control.own import VARIABLE, own_controller
 from annelid.control.trial import SENSORS, Faults, TrialController
 from annelid.errors import ConfigError
 from annelid.experiment import Case, Store, case_key, fingerprint
-from annelid.experiment.processes import Processes
+from annelid.experiment.executors import Processes
 from annelid.protocols import Plant, Sensation
 from annelid.simulation import WormPlant, build_controller, simulate
 from annelid.simulation.batch import simulate_batch

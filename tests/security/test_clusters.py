@@ -15,10 +15,10 @@ from typer.testing import CliRunner
 import annelid
 from annelid.cli import app
 from annelid.errors import ClusterError, ConfigError, MissingDependency
-from annelid.experiment import scheduler as module
+from annelid.experiment import executors
 from annelid.experiment.case import Case
+from annelid.experiment.executors import scheduler
 from annelid.experiment.outcome import OUTCOME_NAME
-from annelid.experiment.scheduler import joined
 from annelid.experiment.store import Store, attempt, case_key
 from annelid.simulation.runfile import FILE_NAME
 from annelid_studies.worms import PLANAR
@@ -68,16 +68,16 @@ def test_a_study_does_not_choose_who_computes_it(
 def test_the_scheduler_that_the_user_names_is_joined_and_a_silent_one_is_not_waited_for(
     listening: socket.socket, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(module, "JOIN_S", 0.5)
+    monkeypatch.setattr(executors, "JOIN_S", 0.5)
     address = f"tcp://127.0.0.1:{listening.getsockname()[1]}"
-    with pytest.raises(ClusterError, match=f"no scheduler answers at {address}: start one with"), joined(address):
+    with pytest.raises(ClusterError, match=f"no scheduler answers at {address}: start one with"), scheduler(address):
         pass
     assert visited(listening)
 
 
 def test_without_dask_the_line_that_installs_it_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, "distributed", None)
-    with pytest.raises(MissingDependency, match=r"pip install 'annelid\[sweep\]'"), joined("tcp://127.0.0.1:9"):
+    with pytest.raises(MissingDependency, match=r"pip install 'annelid\[sweep\]'"), scheduler("tcp://127.0.0.1:9"):
         pass
 
 
@@ -109,7 +109,7 @@ def test_an_address_is_one_and_a_scheduler_file_is_read_as_every_other(tmp_path:
 
 
 def refused(where: str) -> str:
-    with pytest.raises(ConfigError) as error, joined(where):
+    with pytest.raises(ConfigError) as error, scheduler(where):
         pass
     assert str(error.value).isprintable()
     return str(error.value)

@@ -18,8 +18,8 @@ import pytest
 from annelid.errors import ClusterError, ConfigError, RunKilled
 from annelid.experiment import store as module
 from annelid.experiment.case import Case
+from annelid.experiment.executors import Processes
 from annelid.experiment.outcome import OUTCOME_NAME, Outcome
-from annelid.experiment.processes import Processes
 from annelid.experiment.store import DRAFTS, Store, attempt, case_key, compute_run, keep_outcome, new_draft
 from annelid.simulation.runfile import FILE_NAME, open_run
 from annelid_studies.worms import PLANAR, RODS
@@ -73,7 +73,7 @@ def test_every_case_is_computed_once_and_a_second_call_computes_nothing(tmp_path
     store = Store(tmp_path / "runs", here, progress=lambda *state: told.append(state))
     first = store.compute([planar(0), planar(1, 0.2), planar(0)], "runs")
     assert list(first) == [case_key(planar(0)), case_key(planar(1, 0.2))]
-    assert here.keys == [*reversed([*first])], "the longest comes first"
+    assert here.keys == [*first][::-1], "the longest comes first"
     assert [state[:3] for state in told] == [("runs", 0, 2), ("runs", 1, 2), ("runs", 2, 2)]
     assert told[1][3] == pytest.approx(2 / 3)
     assert store.compute([planar(0), planar(1, 0.2)]) == first
@@ -267,7 +267,6 @@ def test_ctrl_c_keeps_finished_runs(tmp_path: Path) -> None:
             os.killpg(study.pid, signal.SIGKILL)
             study.wait(60)
     assert [path.parent for path in store.folder.glob(f"*/{OUTCOME_NAME}")] == [store.path(planar())]
-    assert not list(store.folder.glob(DRAFTS))
 
 
 def test_a_script_that_forgets_its_guard_is_told_so(tmp_path: Path) -> None:

@@ -19,7 +19,7 @@ from annelid.analysis import RhythmScore, Summary
 from annelid.analysis.gait import Gait
 from annelid.config import load_config
 from annelid.errors import ConfigError
-from annelid.experiment import workers
+from annelid.experiment import store as runs
 from annelid.experiment.case import Case
 from annelid.experiment.optimisers import cma_es, generation_size, optimiser_of, parzen
 from annelid.experiment.outcome import Outcome
@@ -364,5 +364,5 @@ def test_a_second_search_computes_nothing(tmp_path: Path, monkeypatch: pytest.Mo
     folder = tmp_path / "runs"
     first = [trial for generation in search(task, Store(folder)) for trial in generation]
     assert {trial.judged.problem for trial in first} == {"out of order: too short: fewer than two cycles"}
-    monkeypatch.setattr(workers, "ProcessPoolExecutor", None)
+    monkeypatch.setattr(runs, "attempt", None)
     assert [trial for generation in search(task, Store(folder)) for trial in generation] == first

@@ -97,15 +97,14 @@ def kept_runs(output: Path, *, jobs: int | None, quiet: bool, scheduler: str | N
     Raises:
         BadParameter: Both jobs and a scheduler are given.
     """
-    from annelid.experiment.processes import Processes
+    from annelid.experiment import executors
     from annelid.experiment.progress import study_progress
-    from annelid.experiment.scheduler import joined
     from annelid.experiment.store import Store
 
     if scheduler is not None and jobs is not None:
         raise typer.BadParameter("--jobs is for processes of this machine: leave it out with --scheduler")
     lock(output)
-    workers = Processes(jobs) if scheduler is None else joined(scheduler)
+    workers = executors.workers(None, jobs) if scheduler is None else executors.scheduler(scheduler)
     with going_on(output / "runs"), workers as executor, study_progress(quiet=quiet) as progress:
         yield Store(output / "runs", executor, progress=progress)
 

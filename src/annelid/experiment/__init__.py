@@ -19,9 +19,9 @@ from annelid.lazy import lazy
 if TYPE_CHECKING:
     from annelid.experiment.case import SHEAR_OVER_YOUNG, Case, write_worm
     from annelid.experiment.check import Check, check, compare, finer_steps, more_elements, refinements
+    from annelid.experiment.executors import Processes, answers, end_after
     from annelid.experiment.fingerprint import code_fingerprint, physics_fingerprint, room_of
     from annelid.experiment.outcome import Hold, Outcome
-    from annelid.experiment.processes import Processes, answers, end_after
     from annelid.experiment.progress import StudyProgress, study_progress
     from annelid.experiment.store import Store, case_key
     from annelid.experiment.tune import START, Judged, judge, numerical_problem

@@ -15,9 +15,9 @@ from annelid.body.worm import WormBody
 from annelid.config import RunConfig
 from annelid.errors import ConfigError, listed
 from annelid.experiment.case import Case
+from annelid.experiment.executors import workers
 from annelid.experiment.numbers import NUMBERS
 from annelid.experiment.outcome import Outcome, outcome
-from annelid.experiment.processes import workers
 from annelid.experiment.progress import StudyProgress
 from annelid.experiment.store import Store, case_key
 from annelid.output import write_json

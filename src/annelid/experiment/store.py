@@ -29,11 +29,12 @@ from annelid.errors import (
     shortened,
 )
 from annelid.experiment.case import Case
+from annelid.experiment.executors import answers, workers
 from annelid.experiment.fingerprint import run_key
 from annelid.experiment.outcome import OUTCOME_NAME, Outcome, outcome, read_outcome, write_outcome
-from annelid.experiment.processes import answers, workers
 from annelid.experiment.progress import StudyProgress
 from annelid.plausibility import refuse_nonsense
+from annelid.simulation.loop import simulate
 from annelid.simulation.runfile import FILE_NAME, Run, open_run
 
 MOST_BYTES = 4 * 2**30
@@ -92,7 +93,8 @@ class Store:
             keep: ``"runs"``, or ``"outcomes"`` to keep their numbers only.
             progress: Called as runs go on; None for nothing.
         """
-        self.folder, self.executor, self.progress, self._whole = folder, executor, progress, keep == "runs"
+        self.folder, self.executor, self._whole = folder, executor, keep == "runs"
+        self.progress: StudyProgress = progress or (lambda *_: None)
 
     def path(self, case: Case) -> Path:
         """Folder of a case's run."""
@@ -153,7 +155,7 @@ class Store:
         def report() -> None:
             text = f"{stage}, {len(errors)} failed" if errors else stage
             share = 1.0 - left_s / total_s if total_s else 1.0
-            (progress or self.progress or _nobody)(text, len(found) + len(errors), len(wanted), share)
+            (progress or self.progress)(text, len(found) + len(errors), len(wanted), share)
 
         report()
         if not missing:
@@ -200,7 +202,7 @@ class Store:
         refused: dict[int, ConfigError] = {}
         failed: dict[str, Exception] = {}
         for i, case in enumerate(cases):
-            (progress or self.progress or _nobody)("checking the runs", i, len(cases), i / len(cases))
+            (progress or self.progress)("checking the runs", i, len(cases), i / len(cases))
             try:
                 refuse_nonsense(case.config)
             except ConfigError as error:
@@ -224,10 +226,6 @@ class Store:
         if not marked.exists():
             marked.write_text(uuid.uuid4().hex, encoding="utf-8")
         return marked.read_text(encoding="utf-8")
-
-
-def _nobody(*_: object) -> None:
-    """Takes no note of how far a study has come."""
 
 
 def case_key(case: Case) -> str:
@@ -296,8 +294,6 @@ def fetch_run(content: object, folder: Path, config: RunConfig) -> None:
 
 def compute_run(config: RunConfig, folder: Path) -> None:
     """Runs a configuration into a folder and writes its outcome beside it."""
-    from annelid.simulation.loop import simulate
-
     try:
         run = simulate(config, folder, progress=False, overwrite=True)
     except SimulationStopped:

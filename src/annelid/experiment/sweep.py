@@ -36,8 +36,8 @@ from annelid.draw.figures.sweep import sweep_figure, worded
 from annelid.errors import ConfigError, shown
 from annelid.experiment.case import Case
 from annelid.experiment.check import MORE, Check, check_runs, percent, refinements
+from annelid.experiment.executors import workers
 from annelid.experiment.numbers import NUMBERS, PREFERRED, Number, chosen_numbers
-from annelid.experiment.processes import workers
 from annelid.experiment.progress import StudyProgress
 from annelid.experiment.space import Choice, Variable, from_unit, sampled, unit_samples, variables_of
 from annelid.experiment.store import Done, Store

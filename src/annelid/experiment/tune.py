@@ -235,9 +235,8 @@ def search(task: Task, store: Store) -> Iterator[list[Trial]]:
     found: list[Trial] = []
 
     def report(stage: str, done: int, _: int, __: float) -> None:
-        if store.progress is not None:
-            done += max(len(found) - 1, 0)
-            store.progress(stage, done, task.n_trials, done / task.n_trials)
+        done += max(len(found) - 1, 0)
+        store.progress(stage, done, task.n_trials, done / task.n_trials)
 
     start = task.start
     own = {one.field: field_value(start.config, one.field) for one in task.variables}

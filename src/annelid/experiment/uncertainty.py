@@ -26,7 +26,7 @@ from annelid.draw.table import framed_table
 from annelid.errors import ConfigError, SimulationStopped
 from annelid.experiment.case import Case
 from annelid.experiment.check import ELEMENTS, STEP, finer_steps, go_on_in, more_elements
-from annelid.experiment.processes import workers
+from annelid.experiment.executors import workers
 from annelid.experiment.progress import StudyProgress
 from annelid.experiment.spread import UNMEASURED, Spread, applicable, changes, draw, read_spread, scaled_fields
 from annelid.experiment.store import Store, case_key

@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 
 import numpy as np
@@ -49,15 +48,6 @@ def test_results_are_kept_unless_forced(annelid: Command) -> None:
         assert Path(folder, file).read_text() == "mine"
 
 
-@pytest.mark.parametrize("study", ["weak-middle", "turning"])
-def test_a_study_needs_a_folder(annelid: Command, study: str) -> None:
-    Path("taken").write_text("mine")
-    done = annelid("experiment", study, "-o", "taken")
-    assert done.exit_code == 2
-    assert "taken is a file" in done.sentence()
-    assert Path("taken").read_text() == "mine"
-
-
 def test_an_unknown_figure_is_refused_with_the_nearest(annelid: Command) -> None:
     done = annelid("plot", "nowhere", "--figure", "trak")
     assert done.exit_code == 2
@@ -78,27 +68,14 @@ def test_the_weak_middle_is_kept_and_told_again(annelid: Command) -> None:
     assert {path: path.stat().st_mtime_ns for path in Path("weak/runs").glob("*/run.nc")} == runs
 
 
-STUDIES = ("weak-middle", "turning", "speed", "gaits", "slip", "slip-detector", "pipes", "riddle2025")
+STUDIES = ("weak-middle", "turning", "speed", "gaits", "slip", "slip-detector", "pipes", "riddle2025", "load-frame")
 
 
-@pytest.mark.parametrize("command", STUDIES)
-def test_a_file_in_place_of_the_folder_of_runs_is_refused(annelid: Command, command: str) -> None:
+def test_a_file_in_place_of_the_folder_of_runs_is_refused(annelid: Command, subtests: pytest.Subtests) -> None:
     Path("taken").write_text("mine", encoding="utf-8")
-    done = annelid("experiment", command, "-o", "taken", "--quiet")
-    assert done.exit_code != 0
-    assert "taken is a file: name a folder" in done.sentence()
-    assert Path("taken").read_text(encoding="utf-8") == "mine"
-
-
-@pytest.mark.slow
-def test_both_studies_of_slip_keep_their_runs_in_one_folder(annelid: Command) -> None:
-    done = annelid("experiment", "slip", "--quick", "-o", "s")
-    assert done.exit_code == 0, done.err
-    assert done.out.splitlines()[-2:] == [str(Path("s/slip.csv")), str(Path("s/slip.png"))]
-    runs = {path.name for path in Path("s/runs").iterdir()}
-    done = annelid("experiment", "slip-detector", "--quick", "-o", "s")
-    assert done.exit_code == 0, done.err
-    assert {path.name for path in Path("s/runs").iterdir()} > runs, "at frictions that were not drawn"
-    for row in csv.DictReader(Path("s/slip_detector.csv").read_text(encoding="utf-8").splitlines()):
-        assert float(row["precision"]) > 2 * float(row["base_rate"]), "far better than a blind guess"
-        assert float(row["recall"]) > 0.5
+    for words in [*(("experiment", study) for study in STUDIES), ("calibrate",), ("tune",), ("bench",)]:
+        with subtests.test(" ".join(words)):
+            done = annelid(*words, "-o", "taken", "--quiet")
+            assert done.exit_code != 0
+            assert "taken is a file: name a folder" in done.sentence()
+            assert Path("taken").read_text(encoding="utf-8") == "mine"

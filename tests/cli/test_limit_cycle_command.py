@@ -29,15 +29,6 @@ def test_json_holds_the_numbers_and_nothing_else(annelid: Command) -> None:
     assert len(response[0]) == len(read["located"]["states"]) == 21
 
 
-@pytest.mark.slow
-def test_all_ways_are_taken_unless_one_is_named(annelid: Command) -> None:
-    read = json.loads(annelid("limit-cycle", "--json").out)
-    for way in ("located", "stepped"):
-        assert read[way]["period_s"] == pytest.approx(2.625, abs=0.003)
-    real, imaginary = read["continuous"]["multipliers"][0]
-    assert (real, imaginary) == (pytest.approx(1.0, abs=0.01), 0.0)
-
-
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [

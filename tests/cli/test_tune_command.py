@@ -30,15 +30,6 @@ def test_bad_input_ends_in_one_sentence_before_anything_runs(
     assert not list(Path().iterdir())
 
 
-@pytest.mark.parametrize("command", [("tune",), ("experiment", "speed")])
-def test_results_need_a_folder(annelid: Command, command: tuple[str, ...]) -> None:
-    Path("taken").write_text("mine")
-    done = annelid(*command, "-o", "taken")
-    assert done.exit_code == 2
-    assert "taken is a file" in done.sentence()
-    assert Path("taken").read_text() == "mine"
-
-
 @pytest.mark.slow
 def test_a_tuned_gait_runs_and_a_second_call_computes_nothing(
     annelid: Command, monkeypatch: pytest.MonkeyPatch

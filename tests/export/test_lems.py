@@ -153,13 +153,14 @@ REFUSED: dict[str, tuple[Callable[[str], str], str]] = {
 }
 
 
-@pytest.mark.parametrize("what", REFUSED)
-def test_a_strange_file_is_refused_with_a_sentence(what: str, file: Callable[[str], Path]) -> None:
-    change, sentence = REFUSED[what]
-    text = lems_text(peristalsis_network(3))
-    assert change(text) != text
-    with pytest.raises(ConfigError, match=sentence):
-        read_lems(file(change(text)))
+def test_a_strange_file_is_refused_with_a_sentence(subtests: pytest.Subtests, file: Callable[[str], Path]) -> None:
+    for what in REFUSED:
+        with subtests.test(f"{what!r:.60}"):
+            change, sentence = REFUSED[what]
+            text = lems_text(peristalsis_network(3))
+            assert change(text) != text
+            with pytest.raises(ConfigError, match=sentence):
+                read_lems(file(change(text)))
 
 
 def test_a_large_file_is_refused(file: Callable[[str], Path]) -> None:
@@ -190,7 +191,7 @@ def test_the_command_writes_and_reads(tmp_path: Path, monkeypatch: pytest.Monkey
         assert run(app, ["export-network", "network.xml", *arguments]).exit_code == 2
 
 
-@pytest.mark.parametrize("value", [np.inf, np.nan, 0.0])
-def test_times_of_the_simulation_are_checked(value: float) -> None:
-    with pytest.raises(ConfigError, match="timestep_ms"):
-        lems_text(peristalsis_network(3), timestep_ms=value)
+def test_times_of_the_simulation_are_checked(subtests: pytest.Subtests) -> None:
+    for value in (np.inf, np.nan, 0.0):
+        with subtests.test(f"{value!r:.60}"), pytest.raises(ConfigError, match="timestep_ms"):
+            lems_text(peristalsis_network(3), timestep_ms=value)

@@ -70,15 +70,16 @@ def test_the_turn_of_a_heading_is_to_the_worm_s_left() -> None:
     assert heading_turn(30.0) @ ahead == pytest.approx([-np.sqrt(0.75), -0.5, 0.0])
 
 
-@pytest.mark.parametrize("changes", FORMULATIONS.values(), ids=FORMULATIONS)
-@pytest.mark.parametrize(("heading", "near"), [(-180.0, 1e-9), (90.0, 5e-4)])
-def test_a_turned_worm_moves_and_feels_as_one_that_is_not(heading: float, near: float, changes: dict[str, Any]) -> None:
+@pytest.mark.parametrize(
+    ("kind", "heading", "near"), [("rods", -180.0, 1e-9), ("chain", 90.0, 5e-4), ("setae", 90.0, 5e-4)]
+)
+def test_a_turned_worm_moves_and_feels_as_one_that_is_not(kind: str, heading: float, near: float) -> None:
     """By half and quarter turns, for which pyramids of friction are the same.
 
     Rods do not quite: how hard the engine holds the length of an edge depends on where that points. Nor does a chain,
     whose solver visits its turned pyramids in another order and ends before it has converged.
     """
-    near = 5e-4 if changes.get("body.formulation.kind") == "chain" else near
+    changes = FORMULATIONS[kind]
     (straight, touched), (leading, touched_so) = worm(0.0, **changes), worm(heading, **changes)
     first, other, turn = straight.observe(), leading.observe(), heading_turn(heading)
     assert np.ptp(first.ring_length_m) > 0.05, "it must have moved"

@@ -40,9 +40,8 @@ class Told(Evidence):
         self.__dict__["runs"] = [(made, None)]
 
 
-@pytest.mark.parametrize(
-    ("ours", "paper", "expected"),
-    [
+def test_a_number_is_judged_by_all_of_its_readings(subtests: pytest.Subtests) -> None:
+    for ours, paper, expected in (
         ((2.5,), 2.5, ("holds", "")),
         ((2.51, 2.49), 2.5, ("holds", "")),
         ((2.6, 2.5), 2.5, ("holds within", "4.0 %")),
@@ -53,12 +52,9 @@ class Told(Evidence):
         ((nan,), 2.5, ("does not hold", "")),
         (SIX_SPRINGS, 0.394, ("rests on", "the spring")),
         (SIX_SPRINGS[:1], 0.394, ("holds within", "0.5 %")),
-    ],
-)
-def test_a_number_is_judged_by_all_of_its_readings(
-    ours: tuple[float, ...], paper: float, expected: tuple[str, str]
-) -> None:
-    assert near(ours, paper, "the spring") == expected
+    ):
+        with subtests.test(f"{ours!r:.60}"):
+            assert near(ours, paper, "the spring") == expected
 
 
 def test_a_property_holds_where_all_have_it() -> None:

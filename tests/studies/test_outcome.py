@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import tempfile
 from dataclasses import replace
 from pathlib import Path
 
@@ -52,15 +53,17 @@ def test_another_readers_outcome_is_refused(held: Run, tmp_path: Path) -> None:
         read_outcome(tmp_path / "outcome.json", "yours")
 
 
-@pytest.mark.parametrize("loss", ["summary", "rhythm", "holds", "message", "gait"])
-def test_an_incomplete_outcome_is_refused(held: Run, tmp_path: Path, loss: str) -> None:
-    path = tmp_path / "outcome.json"
-    write_outcome(outcome(held), path, "mark")
-    content = json.loads(path.read_text())
-    del content[loss]
-    path.write_text(json.dumps(content))
-    with pytest.raises(ValueError, match="no outcome"):
-        read_outcome(path, "mark")
+def test_an_incomplete_outcome_is_refused(subtests: pytest.Subtests, held: Run, tmp_path: Path) -> None:
+    for loss in ("summary", "rhythm", "holds", "message", "gait"):
+        with subtests.test(f"{loss!r:.60}"):
+            folder = Path(tempfile.mkdtemp(dir=tmp_path))
+            path = folder / "outcome.json"
+            write_outcome(outcome(held), path, "mark")
+            content = json.loads(path.read_text())
+            del content[loss]
+            path.write_text(json.dumps(content))
+            with pytest.raises(ValueError, match="no outcome"):
+                read_outcome(path, "mark")
 
 
 def test_no_outcome_is_an_os_error(tmp_path: Path) -> None:

@@ -123,12 +123,6 @@ def passage(config_changes: dict[str, object], arena: str, folder: Path) -> Pass
 
 
 @pytest.mark.slow
-def test_the_worm_passes_a_straight_pipe_as_wide_as_itself(tmp_path: Path) -> None:
-    found = passage({"duration_s": 6.0, "controller": {"kind": "sns-robust", "turn_ms": 270.0}}, "pipe", tmp_path)
-    assert found.middle_m[-1] - found.middle_m[0] > 0.25
-
-
-@pytest.mark.slow
 def test_pressed_backs_raise_the_drive_where_the_taper_narrows(tmp_path: Path) -> None:
     changes = {
         "duration_s": 30.0,

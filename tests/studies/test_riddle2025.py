@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from annelid import load_config, open_run, simulate
-from annelid.analysis import mean_and_interval, passage_of, track_of
+from annelid.analysis import passage_of, track_of
 from annelid.body import WormBody
 from annelid.control.open_loop import TimedWave
 from annelid_studies.riddle2025 import (
@@ -21,7 +21,6 @@ from annelid_studies.riddle2025 import (
     cases,
     comparison_picture,
     comparison_table,
-    in_figure,
     points,
     repeated,
     speed_of_line,
@@ -64,12 +63,6 @@ def test_a_path_goes_on_as_in_its_last_cycle() -> None:
     further_time, further = repeated(time, place, 80.0)
     assert further_time == pytest.approx(np.linspace(0.0, 80.0, 801))
     assert further == pytest.approx(0.04 * further_time + 0.01 * np.sin(2 * np.pi * further_time / 6.0))
-
-
-def test_the_interval_of_a_mean_is_students() -> None:
-    mean, low, high = mean_and_interval([1.0, 2.0, 3.0])
-    assert (mean, high - mean, mean - low) == pytest.approx((2.0, 4.3027 / np.sqrt(3), 4.3027 / np.sqrt(3)), rel=1e-4)
-    assert np.isnan(mean_and_interval([1.0])[1:]).all()
 
 
 def test_runs_of_a_point_differ_in_friction_alone_and_by_a_percent_at_most() -> None:
@@ -124,14 +117,6 @@ def test_the_foremost_ring_goes_ahead_on_flat_ground_and_along_a_bend(tmp_path: 
         run = open_run(simulate(config, tmp_path / point.ground, progress=False).path)
         way = ahead_m(track_of(run)) if point.ground == "flat" else passage_of(run).front_m
         assert way[-1] - way[0] > 0.1
-
-
-def test_what_the_authors_figure_has() -> None:
-    wanted = {0.3: "not run", 0.5: "taken out", 0.7: "drawn"}
-    for radius, word in wanted.items():
-        assert in_figure(Point("bend", "3x1", PIPE_FRICTION, radius, False)) == word
-    assert in_figure(Point("bend", "3x1, touch", PIPE_FRICTION, 0.5, False)) == "drawn"
-    assert in_figure(Point("flat", "3x1", PIPE_FRICTION, float("nan"), False)) == ""
 
 
 def test_the_bend_starts_as_far_ahead_as_the_authors_does() -> None:

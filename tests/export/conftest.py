@@ -17,29 +17,22 @@ def squeeze(sensation: Sensation) -> np.ndarray:
 
 
 @pytest.fixture(scope="session")
-def planar_run(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    """A second of a planar worm."""
-    config = load_config("riddle2022-planar", {"duration_s": 1.0})
-    return simulate(config, tmp_path_factory.mktemp("planar") / "run", progress=False)
-
-
-@pytest.fixture(scope="session")
 def chain_run(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    """The same as a chain of capsules."""
+    """A worm of capsules for a moment."""
     config = load_config("riddle2023", {"duration_s": 0.02})
     return simulate(config, tmp_path_factory.mktemp("chain") / "run", progress=False)
 
 
 @pytest.fixture(scope="session")
 def user_run(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    """The same worm under a user's function."""
+    """A 3D worm under a user's function."""
     config = load_config("riddle2023-rods", {"duration_s": 0.1})
     return simulate(config, tmp_path_factory.mktemp("user") / "run", controller=squeeze, progress=False)
 
 
 @pytest.fixture(scope="session", params=["planar", "rods"])
 def run(request: pytest.FixtureRequest) -> Run:
-    """Either of the two."""
+    """A planar and a 3D run."""
     return request.getfixturevalue(f"{request.param}_run")
 
 

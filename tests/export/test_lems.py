@@ -83,7 +83,6 @@ def test_random_networks_are_read_back(benchmark: ModuleType, file: Callable[[st
 
 
 def test_pylems_computes_the_same_potentials(benchmark: ModuleType, tmp_path: Path) -> None:
-    pytest.importorskip("lems")
     found = benchmark.difference_mV(peristalsis_network(3), benchmark.PYLEMS, tmp_path, 0.5, 200.0)
     assert found < 1e-9
     assert benchmark.difference_mV(all_parts(), benchmark.PYLEMS, tmp_path, 0.5, 200.0) < 1e-9
@@ -91,7 +90,6 @@ def test_pylems_computes_the_same_potentials(benchmark: ModuleType, tmp_path: Pa
 
 @pytest.mark.parametrize("seed", [1, 3, 7])
 def test_spikes_and_releases_are_the_same_too(seed: int, benchmark: ModuleType, tmp_path: Path) -> None:
-    pytest.importorskip("lems")
     network = benchmark.random_network(seed)
     kinds = [type(each.kind) for each in network.connections]
     assert SpikingSynapse in kinds

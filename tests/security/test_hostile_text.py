@@ -256,7 +256,6 @@ def test_mjcf_of_any_name_is_xml(tmp_path: Path) -> None:
 
 
 def test_an_exported_view_shows_the_name_and_loads_nothing(tmp_path: Path) -> None:
-    pytest.importorskip("viser", reason="the live view needs viser: pip install '.[view]'")
     path = tmp_path / "walk.html"
     words = ["riddle2023-rods", "--set", "duration_s=0.05", "--set", f"name={json.dumps(NAME)}"]
     annelid("view", *words, "--export", path)
@@ -267,7 +266,6 @@ def test_an_exported_view_shows_the_name_and_loads_nothing(tmp_path: Path) -> No
 
 
 def test_the_panel_of_a_view_shows_names_as_text() -> None:
-    pytest.importorskip("viser", reason="the live view needs viser: pip install '.[view]'")
     from annelid.live.panel import status_html
 
     assert {tag for tag, _ in Tags(status_html(NAME, [NAME], NAME)).found} == {"div", "b"}

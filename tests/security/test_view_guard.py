@@ -10,11 +10,8 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
-import pytest
-
-pytest.importorskip("viser", reason="the live view needs viser: pip install '.[view]'")
-
 import msgspec
+import pytest
 import viser
 from websockets.exceptions import ConnectionClosed, ConnectionClosedError, InvalidStatus
 from websockets.sync.client import connect

@@ -17,7 +17,6 @@ from live_page import CHROMIUM, open_show
 from annelid.config import load_config
 from annelid.draw import html_page
 
-pytest.importorskip("axe_playwright_python", reason="the script of axe-core is missing: pip install '.[test]'")
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium here to open pages with")
 
 if TYPE_CHECKING:
@@ -77,7 +76,6 @@ def test_a_report(page: Page, tmp_path: Path) -> None:
 
 
 def test_the_live_view(page: Page) -> None:
-    pytest.importorskip("viser", reason="the live view needs viser: pip install '.[view]'")
     with open_show(load_config("riddle2023-rods")) as show:
         page.goto(show.address)
         page.wait_for_selector("text=Nervous system", state="attached", timeout=60_000)

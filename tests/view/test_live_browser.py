@@ -15,8 +15,6 @@ from annelid.simulation.loop import simulate
 from annelid.simulation.runfile import Run
 from annelid.simulation.worm import WormPlant
 
-pytest.importorskip("viser", reason="the live view needs viser: pip install '.[view]'")
-pytest.importorskip("playwright", reason="the tests of pages need playwright: pip install '.[test]'")
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium here to open pages with")
 
 if TYPE_CHECKING:

@@ -267,7 +267,6 @@ def test_a_run_is_read_as_it_was_recorded(rods_run: Run) -> None:
     ],
 )
 def test_the_ground_is_there(arena: str, overrides: dict[str, Any], nodes: set[str]) -> None:
-    pytest.importorskip("viser", reason="the live view needs viser: pip install '.[view]'")
     from annelid.live.server import Server
     from annelid.live.stage import LAYERS, Stage
 
@@ -285,7 +284,6 @@ def test_the_ground_is_there(arena: str, overrides: dict[str, Any], nodes: set[s
 
 
 def test_a_ray_is_turned_into_the_axes_of_a_slope() -> None:
-    pytest.importorskip("viser", reason="the live view needs viser: pip install '.[view]'")
     from annelid.live.server import Server
     from annelid.live.stage import Stage
 

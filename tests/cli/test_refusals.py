@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
+
 from outcome import Command
 
 
@@ -25,20 +26,20 @@ from outcome import Command
         (("run", "--duration", "-1"), "duration_s = -1"),
         (("run", "--fidelity", "acurate"), "did you mean 'accurate'"),
         (("run", "riddle2022-planar", "--fidelity", "fast"), "fidelity = 'fast' is for the 3D worm"),
-        (("build", "riddle2023-fast", "--fidelity", "preview"), "share their pins"),
+        (("export", "--to", "mjcf", "riddle2023-fast", "--fidelity", "preview"), "share their pins"),
         (("run", "nothere.toml"), "cannot read the configuration file nothere.toml"),
         (("run", "--resume", "nothere"), "there is no run file nothere"),
-        (("build", "riddle2022-planar"), "has no MuJoCo model"),
+        (("export", "--to", "mjcf", "riddle2022-planar"), "has no MuJoCo model"),
         (("export-network", "nothere.toml"), "cannot read the configuration file nothere.toml"),
         (("export-network", "crawler-timed"), "only controllers that step a network can"),
         (
-            ("build", "riddle2023-rods", "-o", "no/such/worm.xml"),
+            ("export", "--to", "mjcf", "riddle2023-rods", "-o", "no/such/worm.xml"),
             "cannot be written: there is no folder no/such",
         ),
         (("show", "nothere"), "there is no run file nothere"),
-        (("plot", "nothere"), "there is no run file nothere"),
-        (("render", "nothere", "--time", "1"), "there is no run file nothere"),
-        (("presets", "ridle2023"), "did you mean 'riddle2023'"),
+        (("draw", "nothere"), "there is no run file nothere"),
+        (("draw", "nothere", "--time", "1"), "there is no run file nothere"),
+        (("list", "presets", "ridle2023"), "did you mean 'riddle2023'"),
     ],
 )
 def test_bad_input_ends_in_one_sentence_and_leaves_nothing(
@@ -57,8 +58,7 @@ def test_wrong_usage_is_exit_2_without_a_traceback(subtests: pytest.Subtests, an
         ("run", "--duration", "long"),
         ("run", "--duration", "nan"),
         ("crawl",),
-        ("render", "somewhere"),
-        ("render", "somewhere", "-o", "frame.png", "--video", "v.mp4"),
+        ("draw", "somewhere", "-o", "frame.png", "--video", "v.mp4"),
     ):
         with subtests.test(f"{arguments!r:.60}"):
             done = annelid(*arguments)
@@ -76,7 +76,7 @@ def test_a_used_output_folder_is_refused_and_left_alone(annelid: Command) -> Non
     assert [path.name for path in Path("out").iterdir()] == ["notes.txt"]
 
 
-@pytest.mark.parametrize("arguments", [("plot", "-o"), ("render", "--time", "0.5", "-o"), ("render", "--video")])
+@pytest.mark.parametrize("arguments", [("draw", "-o"), ("draw", "--time", "0.5", "-o"), ("draw", "--video")])
 def test_existing_pictures_are_kept_unless_forced(annelid: Command, finished: Path, arguments: tuple[str, ...]) -> None:
     target = Path("v.mp4" if "--video" in arguments else "p.png")
     target.write_text("mine")
@@ -92,7 +92,7 @@ def test_existing_pictures_are_kept_unless_forced(annelid: Command, finished: Pa
 
 @pytest.mark.parametrize(
     ("arguments", "option", "name"),
-    [(("plot",), "-o", "figure7.png"), (("render", "--time", "0.5"), "-o", "frame.png")],
+    [(("draw",), "-o", "figure7.png"), (("draw", "--time", "0.5"), "-o", "frame.png")],
 )
 def test_a_runs_own_pictures_are_drawn_anew_unless_they_are_named(
     annelid: Command, finished: Path, arguments: tuple[str, ...], option: str, name: str
@@ -109,25 +109,25 @@ def test_a_runs_own_pictures_are_drawn_anew_unless_they_are_named(
 
 def test_a_name_without_suffix_does_not_replace_the_png(annelid: Command, finished: Path) -> None:
     Path("mine.png").write_text("mine")
-    done = annelid("plot", finished, "-o", "mine")
+    done = annelid("draw", finished, "-o", "mine")
     assert done.exit_code == 2
     assert "mine.png exists" in done.sentence()
     assert Path("mine.png").read_text() == "mine"
-    assert annelid("plot", finished, "-o", "other").out.split() == ["other.png"]
+    assert annelid("draw", finished, "-o", "other").out.split() == ["other.png"]
     assert [path.name for path in Path().iterdir() if path.name.startswith("other")] == ["other.png"]
 
 
 def test_plot_writes_three_formats_only(subtests: pytest.Subtests, annelid: Command, finished: Path) -> None:
     for name in ("a.xyz", "a.jpg", ""):
         with subtests.test(f"{name!r:.60}"):
-            done = annelid("plot", finished, "-o", name)
+            done = annelid("draw", finished, "-o", name)
             assert done.exit_code == 2
             assert ".png, .pdf, .svg" in done.sentence() or "is a folder" in done.sentence()
             assert list(Path().iterdir()) == []
 
 
 def test_an_empty_name_is_not_the_default(subtests: pytest.Subtests, annelid: Command) -> None:
-    for command in (("run",), ("build",), ("presets", "--fields")):
+    for command in (("run",), ("list", "presets", "--fields")):
         with subtests.test(f"{command!r:.60}"):
             done = annelid(*command, "")
             assert done.exit_code == 2
@@ -156,7 +156,7 @@ def test_a_last_resort_is_a_sentence(
 
 
 def test_a_time_that_was_not_recorded_is_refused(annelid: Command, finished: Path) -> None:
-    done = annelid("render", finished, "--time", "7", "-o", "late.png")
+    done = annelid("draw", finished, "--time", "7", "-o", "late.png")
     assert done.exit_code == 2
     assert "recorded from 0 to 1 s" in done.sentence()
     assert not Path("late.png").exists()
@@ -164,7 +164,7 @@ def test_a_time_that_was_not_recorded_is_refused(annelid: Command, finished: Pat
 
 def test_a_back_end_that_the_engine_does_not_know_is_a_sentence(tmp_path: Path) -> None:
     done = subprocess.run(
-        [sys.executable, "-m", "annelid", "build", "riddle2023-rods"],
+        [sys.executable, "-m", "annelid", "export", "riddle2023-rods", "--to", "mjcf"],
         cwd=tmp_path,
         env={**os.environ, "MUJOCO_GL": "vulkan"},
         capture_output=True,
@@ -182,7 +182,7 @@ def test_a_full_disk_is_a_sentence(annelid: Command, finished: Path, monkeypatch
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "figure.png")
 
     monkeypatch.setattr("annelid.draw.plots.save", full)
-    done = annelid("plot", finished, "-o", "figure.png")
+    done = annelid("draw", finished, "-o", "figure.png")
     assert done.exit_code == 2
     assert done.sentence() == f"figure.png: {os.strerror(errno.ENOSPC)}"
 

@@ -17,10 +17,10 @@ import numpy as np
 import psutil
 import pytest
 import xarray as xr
-from outcome import Command
 
 from annelid.cli.entry import EXIT_SOME_FAILED
 from annelid.experiment.attempt import DRAFTS, OUTCOME_NAME
+from outcome import Command
 
 SHORT = """
 preset = "riddle2022-planar"

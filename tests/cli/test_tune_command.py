@@ -3,9 +3,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from outcome import Command
 
 from annelid.config import load_config
+from outcome import Command
 
 pytestmark = pytest.mark.usefixtures("runs_in_this_process")
 

@@ -97,7 +97,7 @@ def test_a_back_end_of_matplotlib_that_is_not_there_does_no_harm(tmp_path: Path)
 
 def test_a_terminal_that_knows_ascii_only_is_served(tmp_path: Path) -> None:
     (tmp_path / "w.toml").write_text('extends = "riddle2022-planar"\nsummary = "🪱"\n', encoding="utf-8")
-    for arguments in (["presets"], ["presets", "w.toml", "--fields"]):
+    for arguments in (["list", "presets"], ["list", "presets", "w.toml", "--fields"]):
         done = subprocess.run(
             [sys.executable, "-m", "annelid", *arguments],
             cwd=tmp_path,

@@ -158,30 +158,6 @@ def test_against_a_stiff_ring_a_servo_stalls_at_its_force_limit() -> None:
         assert felt.muscle_force_N == pytest.approx(LIMIT_N - rate * step * timestep_s, abs=0.06 * LIMIT_N)
 
 
-@pytest.mark.parametrize(
-    "formulation",
-    [
-        {},
-        pytest.param(
-            {"body.formulation.kind": "chain", "clock.physics_timestep_s": 0.001}, marks=pytest.mark.slow, id="chain"
-        ),
-    ],
-)
-def test_a_servo_never_pushes_nor_pulls_above_its_limit(formulation: dict[str, Any]) -> None:
-    """Cables far too short, suddenly told to shorten or to let go."""
-    plant = worm(**formulation, **{"body.rings.length_range_m": [0.6, 0.9], "body.rings.speed_limit_m_per_s": 5.0})
-    rng = np.random.default_rng(0)
-    most = 0.0
-    for _ in range(20):
-        activation = rng.integers(0, 2, plant.n_muscles).astype(float)
-        for _ in range(5):
-            force = plant.step(activation).muscle_force_N
-            assert force.min() >= 0.0
-            assert force.max() <= LIMIT_N * (1.0 + 1e-12)
-            most = max(most, force.max())
-    assert most > 0.9 * LIMIT_N
-
-
 MOTOR_M = 1.19
 MOTOR = {"body.rings.no_load_speed_m_per_s": 0.04, "body.rings.cable_friction": MOTOR_M}
 FELT = -expm1(-MOTOR_M) / MOTOR_M

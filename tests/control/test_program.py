@@ -188,13 +188,6 @@ def joined_equal(first: Run, second: Run, whole: Run) -> None:
             np.testing.assert_array_equal(np.concatenate(parts), variable.values, err_msg=str(name))
 
 
-def test_a_continued_planar_run_equals_the_whole_bit_for_bit(tmp_path: Path) -> None:
-    # The cut lies within both contractions, one of them on its way down.
-    first = simulate(planar(0.22), tmp_path / "1", progress=False)
-    second = simulate(planar(0.5), tmp_path / "2", resume=first, progress=False)
-    joined_equal(first, second, simulate(planar(0.5), tmp_path / "3", progress=False))
-
-
 def rods(duration_s: float) -> RunConfig:
     coarse = {"body.mesh.elements_per_side": 1, "body.rings.layout": "halves", "clock.control_timestep_s": 0.005}
     return load_config(

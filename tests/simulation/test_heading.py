@@ -15,7 +15,6 @@ from annelid.analysis import summary
 from annelid.analysis.gait import gait, slip_cost
 from annelid.analysis.track import track_of
 from annelid.body.assemble import mjcf_text
-from annelid.draw.camera import VIEWS_DEG, view_angles
 from annelid.environments import WormEnv
 from annelid.errors import ConfigError
 from annelid.morphology import heading_turn
@@ -183,8 +182,3 @@ def test_an_environment_counts_its_way_where_the_worm_leads() -> None:
         told.append([(reward, info["travel"], *observation) for observation, reward, _, _, info in steps])
     assert np.abs(np.array(told[0])[:, 1]).max() > 1e-3
     assert np.array(told[1]) == pytest.approx(np.array(told[0]), abs=1e-6)
-
-
-def test_views_turn_with_the_worm_but_for_those_that_stand_still() -> None:
-    assert view_angles("side", 30.0) == (VIEWS_DEG["side"][0] + 30.0, VIEWS_DEG["side"][1])
-    assert view_angles("course", 30.0) == VIEWS_DEG["course"]

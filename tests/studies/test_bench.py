@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from annelid.cli import app
-from annelid.config import LEVELS, load_config
+from annelid.config import load_config
 from annelid.errors import ConfigError, RunFileError
 from annelid_studies.bench import benchmark as store_module
 from annelid_studies.bench.benchmark import (
@@ -27,7 +27,7 @@ from annelid_studies.bench.benchmark import (
     judge,
     slowdowns,
 )
-from annelid_studies.bench.cases import JUDGED_S, LINES, N_PERTURBED, BenchCase, bench_cases, converged, judged, timed
+from annelid_studies.bench.cases import LINES, N_PERTURBED, BenchCase, bench_cases, judged, timed
 from annelid_studies.bench.measure import measure
 from annelid_studies.bench.report import bench_figure, bench_table
 from annelid_studies.bench.timing import (
@@ -126,18 +126,10 @@ class TestErrors:
         found = error(numbers() | {"elongation_mean_max_m": [0.08, None]}, numbers())
         assert (found["elongation"], found["period"]) == (None, 0.0)
 
-    def test_perturbed_runs_are_compared_in_pairs(self) -> None:
-        pairs = errors([numbers(0.08), numbers(0.04)], [numbers(0.08), numbers(0.05)])
-        assert pairs["elongation"] == [0.0, pytest.approx(0.2)]
-
 
 @given(st.floats(0.5, 3.0), positive, st.lists(st.integers(1, 100), min_size=2, unique=True))
 def test_exponent_of_a_power_law(power: float, factor: float, sizes: list[int]) -> None:
     assert exponent(sizes, [factor * n**power for n in sizes]) == pytest.approx(power, abs=1e-6)
-
-
-def test_one_size_has_no_exponent() -> None:
-    assert exponent([3, 3], [1.0, 2.0]) is None
 
 
 class TestTiming:
@@ -195,36 +187,6 @@ class TestCases:
         full = {case.name: case.case.config for case in bench_cases("full")}
         for case in bench_cases("quick"):
             assert full[case.name] == case.case.config
-
-    def test_all_levels_are_among_the_cases(self) -> None:
-        entries = judge(cases := bench_cases("quick", ["levels"]), {case.name: {"failed": "-"} for case in cases})
-        assert set(entries["levels"]) == set(LEVELS)
-        by_name = {case.name: case for case in cases}
-        for level, name in entries["levels"].items():
-            assert by_name[name].case.config == load_config(RODS, {**LEVELS[level].changes, "duration_s": JUDGED_S})
-
-    def test_the_converged_run_differs_in_step_contact_and_sampling_only(self) -> None:
-        four = {"body.mesh.elements_per_side": 4, "clock.physics_timestep_s": 0.02}
-        fine, coarse = converged().case.config, judged(four, "steps").case.config
-        body = fine.body.model_dump()
-        assert body["formulation"].pop("friction_impedance_ratio") == 1000.0
-        other = coarse.body.model_dump()
-        other["formulation"].pop("friction_impedance_ratio")
-        assert body == other
-        assert fine.clock.physics_timestep_s == 0.001
-        assert fine.clock.control_timestep_s == coarse.clock.control_timestep_s == 0.001
-        assert (fine.controller, fine.sensor, fine.arena) == (coarse.controller, coarse.sensor, coarse.arena)
-
-    def test_perturbed_runs_differ_in_friction_and_seed_only(self) -> None:
-        case = judged({}, "steps")
-        for one in case.perturbed:
-            config = case.case.config
-            assert one.arena is not None
-            assert config.arena is not None
-            assert 0.0 < abs(one.arena.friction - config.arena.friction) <= 0.01
-            same = {"arena": config.arena, "seed": config.seed}
-            assert one.model_copy(update=same) == config
-        assert timed(RODS, 3, 1.0, "duration").perturbed == []
 
     def test_an_unknown_line_is_refused(self) -> None:
         with pytest.raises(ConfigError, match="did you mean 'segments'"):

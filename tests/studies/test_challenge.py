@@ -16,7 +16,7 @@ from annelid.errors import ConfigError, RunFileError
 from annelid.experiment import Store
 from annelid.protocols import Array, Controller, Plant, Sensation
 from annelid_studies.challenge import report, scores, tasks
-from annelid_studies.challenge.ranking import ALL, agreement, interval, mean_speeds, standings
+from annelid_studies.challenge.ranking import ALL, agreement, mean_speeds, standings
 from annelid_studies.challenge.scores import Score, challenge, electric_energy_J, read_scores
 from annelid_studies.challenge.tasks import REFERENCE, Entrant, all_tasks, entries, find_entrants
 
@@ -189,18 +189,6 @@ def test_the_ranking_is_the_mean_of_ratios_over_tasks() -> None:
     assert mine.speed_low < mine.speed_m_per_s < mine.speed_high
     assert found["mine", ALL].robust == 0.5
     assert 0.0 < found["mine", ALL].robust_low < 0.5 < found["mine", ALL].robust_high < 1.0
-
-
-def test_tasks_draws_are_independent_so_that_many_tasks_narrow_the_interval() -> None:
-    """A mean over n tasks varies by a factor of the root of n less than that over one."""
-    rng, widths = np.random.default_rng(0), []
-    for n_tasks in (1, 25):
-        values = rng.normal(size=(40, n_tasks, 1))
-        mean, low, high = interval(values, lambda means: means[..., 0].mean(axis=-1))
-        assert mean == pytest.approx(values.mean())
-        widths.append(high - low)
-    assert widths[0] == pytest.approx(2 * 1.96 / 40**0.5, rel=0.3)
-    assert widths[1] == pytest.approx(widths[0] / 5, rel=0.3)
 
 
 def test_runs_in_time_have_their_entrants_own_period() -> None:

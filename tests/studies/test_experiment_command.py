@@ -55,20 +55,6 @@ def test_an_unknown_figure_is_refused_with_the_nearest(annelid: Command) -> None
     assert "unknown figure 'trak': did you mean 'track'?" in done.sentence()
 
 
-@pytest.mark.slow
-def test_the_weak_middle_is_kept_and_told_again(annelid: Command) -> None:
-    first = annelid("study", "weak-middle", "--quick", "-o", "weak", "--quiet")
-    assert first.exit_code == 0, first.err
-    assert first.out.splitlines() == [str(Path("weak/weak_middle.csv")), str(Path("weak/weak_middle.png"))]
-    table = Path("weak/weak_middle.csv").read_bytes()
-    runs = {path: path.stat().st_mtime_ns for path in Path("weak/runs").glob("*/run.nc")}
-    again = annelid("study", "weak-middle", "--quick", "-o", "weak")
-    assert again.exit_code == 0, again.err
-    assert "force-limited" in again.out
-    assert Path("weak/weak_middle.csv").read_bytes() == table
-    assert {path: path.stat().st_mtime_ns for path in Path("weak/runs").glob("*/run.nc")} == runs
-
-
 STUDIES = ("weak-middle", "turning", "speed", "gaits", "slip", "slip-detector", "pipes", "riddle2025", "load-frame")
 
 

@@ -153,12 +153,6 @@ def test_a_ring_cannot_be_wound_away() -> None:
         load_frame(load_config("riddle2022-planar"))
 
 
-def test_forces_are_compared_within_the_measured_way() -> None:
-    at = triangle(1.0, 1.0).places(20)
-    assert np.diff(at) == pytest.approx(np.full(len(at) - 1, 0.3 / 22))
-    assert 0.01 < at[0] < at[-1] < 0.28
-
-
 HEXAGON = 0.16 * np.array([[0, np.cos(a), np.sin(a)] for a in np.pi / 3 * np.arange(6)])
 
 

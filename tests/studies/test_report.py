@@ -148,17 +148,6 @@ def test_both_files_hold_everything(both: Reading, report: Report) -> None:
     assert all(map(both.has, ("2.635", "−0.2 %", "2.283", "annelid 0.3.0", "runs 312")))
 
 
-def test_each_claim_has_its_own_evidence(html: Reading, report: Report) -> None:
-    blocks = [block for block in html.texts["tbody"] if "of the paper" in block]
-    assert len(blocks) == 10
-    for block in blocks:
-        number = re.findall(r"Claim (\d+) of the paper", block)
-        assert f"{claim(int(number[0])).verdict} {claim(int(number[0])).within}".strip() in block
-        assert re.findall(r"Evidence (\d+):", block) == number
-        assert re.findall(r"seed=(\d+)", block) in ([], number)
-    assert html.attributes("tbody", "id") == [f"claim-{n}" for n in range(1, 11)]
-
-
 def test_pictures_are_embedded_and_have_captions(html: Reading, rendered: Reading, pictures: Path) -> None:
     prefix = "data:image/png;base64,"
     sources = html.attributes("img", "src")
@@ -207,12 +196,6 @@ def test_a_part_of_the_report_tells_its_own_command(report: Report, tmp_path: Pa
     commands = Reading(write_report(part, tmp_path).read_text(encoding="utf-8")).texts["code"]
     assert "annelid paper -o report --only pins --only springs" in commands
     assert "annelid paper -o report" not in commands
-
-
-def test_a_quick_report_says_so_and_how_to_repeat_it(report: Report, pictures: Path, tmp_path: Path) -> None:
-    quick = Reading(write_report(replace(report, effort="quick"), tmp_path).read_text(encoding="utf-8"))
-    assert quick.has("Quick report")
-    assert quick.has("annelid paper -o report --quick --only pins")
 
 
 def test_the_page_of_claims(report: Report) -> None:

@@ -142,12 +142,6 @@ def test_a_latin_hypercube_has_one_sample_in_every_stratum_of_every_variable(n: 
         assert sorted(np.floor(column * n).astype(int).tolist()) == list(range(n))
 
 
-def test_whole_numbers_are_drawn_alike_often() -> None:
-    plan = plan_of(study([{"field": SEGMENTS, "from": 3, "to": 6}], design="sobol", samples=64))
-    assert [sample[0] for sample in plan.samples].count(3) == 16
-    assert [sample[0] for sample in plan.samples].count(6) == 16
-
-
 def test_fields_may_be_nested_and_lack_their_units() -> None:
     nested = load_study(
         {

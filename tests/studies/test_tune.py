@@ -143,11 +143,6 @@ def test_a_place_in_a_range_and_its_value_are_each_other_s_inverse(
 VALLEY = (Interval("a", 1.0, 100.0, logarithmic=True), Interval("b", -1.0, 1.0))
 
 
-def valley(values: Mapping[str, Any]) -> float:
-    """Zero at a = 30, b = 0.4; 1 a fifth of each range away."""
-    return (log(values["a"] / 30.0) / log(100.0) / 0.2) ** 2 + ((values["b"] - 0.4) / 0.4) ** 2
-
-
 def test_numbers_and_one_objective_are_for_the_evolution_strategy() -> None:
     choice = Choice("c", (1, 2))
     assert "cma_es" in repr(optimiser_of(VALLEY, 1, None, 0))

@@ -22,7 +22,6 @@ from annelid.errors import ConfigError, SimulationStopped
 from annelid.experiment import uncertainty as study
 from annelid.experiment.case import Case
 from annelid.experiment.spread import ABSENT, CALIBRATION, EXACT, FIELDS, UNMEASURED, applicable, changes, draw
-from annelid.experiment.store import case_key
 from annelid.experiment.uncertainty import (
     Quantity,
     Spread,
@@ -34,7 +33,6 @@ from annelid.experiment.uncertainty import (
     plan,
     read_spread,
     readings,
-    scatter,
     uncertainty,
     uncertainty_table,
     write_uncertainty,
@@ -107,14 +105,6 @@ def test_many_draws_are_normal() -> None:
     for column, error in zip(drawn.T, (0.1, 0.2), strict=True):
         levels = np.array([statistics.NormalDist(sigma=error).cdf(value) for value in np.sort(column)])
         assert levels == pytest.approx((np.arange(1000) + 0.5) / 1000, abs=0.02)
-
-
-@settings(max_examples=20)
-@given(slope=st.lists(st.floats(-5.0, 5.0), min_size=3, max_size=3), seed=st.integers(0, 10**6))
-def test_the_scatter_of_a_linear_answer_is_that_of_linear_propagation(slope: list[float], seed: int) -> None:
-    known = read_spread()
-    answers = 7.0 + draw(8, known, seed) @ slope
-    assert scatter(answers.tolist()) == pytest.approx(sqrt(np.array(slope) @ covariance(known) @ slope), abs=1e-9)
 
 
 # The parameters
@@ -307,13 +297,6 @@ def test_elements_end_where_the_mesh_does() -> None:
     assert more_elements(load_config(RODS)) == [3, 4]
     assert more_elements(load_config(RODS, {"body.mesh.elements_per_side": 31})) == [32]
     assert more_elements(load_config("riddle2023")) == [4, 5]
-
-
-def test_an_unchanged_variant_is_the_run_itself() -> None:
-    for preset in (RODS, "wang", "riddle2023"):
-        config = load_config(preset)
-        assert variant(config, {}).config == config
-        assert case_key(variant(config, {})) == case_key(variant(config, {"seed": config.seed}))
 
 
 def test_a_plan_changes_only_what_it_says() -> None:

@@ -102,15 +102,6 @@ def test_mirror_segments_elongate_alike(bench: Bench) -> None:
     assert last.ring_length_m == pytest.approx(first.ring_length_m, rel=0.01)
 
 
-@pytest.mark.slow
-def test_without_weight_the_neighbours_stiffness_alone_holds_the_middle_back(bench: Bench) -> None:
-    four = {"body.mesh.n_segments": 4, **weight_changes(0)}
-    weightless = bench.deficit(force_limited(FORCE_N), **four)
-    assert weightless > 0.02
-    rough = bench(2, force_limited(FORCE_N), **four, **{"arena.friction": 1.5})
-    assert rough.elongation_m == pytest.approx(bench(2, force_limited(FORCE_N), **four).elongation_m, rel=1e-6)
-
-
 def test_limits_of_length_hide_the_weak_middle(bench: Bench) -> None:
     assert bench.deficit(length_limited(0.80)) < 0.5 * bench.deficit(force_limited(FORCE_N))
     end, middle = (bench(segment, length_limited(0.80)) for segment in (1, 2))
@@ -316,15 +307,3 @@ def test_the_tables_say_what_was_found(readings: list[Reading], capsys: pytest.C
         "6.15 / 3.82 / 4.78 / 5.98",
     ):
         assert words in shown
-
-
-@pytest.mark.slow
-def test_the_prototypes_elongations_at_13_N(tmp_path: Path) -> None:
-    """Another code's figures: 6.44, 4.97 cm at 0.77 kg, held against creeping ground contact as that code had it."""
-    contact = {"body.formulation.friction_impedance_ratio": 100.0, "clock.physics_timestep_s": 0.01}
-    elongations = []
-    for segment in (1, 2):
-        case = pull(segment, force_limited(13.0), {**weight_changes(0.77), **contact, "clock.control_timestep_s": 0.01})
-        elongations.append(read_pull(segment, outcome(simulate(case.config, tmp_path / str(segment), progress=False))))
-    assert elongations[0].elongation_m == pytest.approx(0.0644, rel=0.1)
-    assert elongations[1].elongation_m == pytest.approx(0.0497, rel=0.1)

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from annelid.draw import gl
-from annelid.draw.doctor import Finding, examine
+from annelid.draw.doctor import examine
 from annelid.draw.render import render_frame
 from annelid.errors import RenderingUnavailable
 from annelid.simulation.runfile import Run
@@ -47,12 +47,6 @@ def test_doctor_finds_what_the_tests_themselves_run_on() -> None:
     for item in ("annelid", "python", "mujoco", "numpy", "xarray", "ffmpeg"):
         assert findings[item].ok, item
     assert all(finding.optional or finding.ok or finding.remedy for finding in findings.values())
-
-
-def test_a_missing_item_comes_with_the_line_that_installs_it() -> None:
-    line = Finding("ffmpeg", False, "not found", "pip install imageio-ffmpeg").line()
-    assert line.split() == ["missing", "ffmpeg", "not", "found:", "pip", "install", "imageio-ffmpeg"]
-    assert Finding("ffmpeg", True, "7.0", "pip install imageio-ffmpeg").line().split() == ["ok", "ffmpeg", "7.0"]
 
 
 def test_a_chosen_back_end_that_fails_is_to_be_unset(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,7 +11,7 @@ import imageio.v3
 import numpy as np
 import pytest
 
-from annelid.body import Rings, muscle_force
+from annelid.body import Rings
 from annelid.body.worm import WormBody
 from annelid.config import load_config
 from annelid.draw.figures import network_diagram
@@ -91,13 +91,6 @@ def rings() -> Rings:
     body = load_config("riddle2023").body
     assert isinstance(body, WormBody)
     return body.muscles
-
-
-@pytest.mark.parametrize("activation", [0.0, 0.4, 1.0])
-def test_the_engine_follows_the_documented_formula(rings: Rings, activation: float) -> None:
-    length, velocity = np.meshgrid(np.linspace(0.3, 2.0, 171), np.linspace(-2.0, 2.0, 81))
-    engine = muscle_surface.engine_flv(length, velocity, rings, activation)
-    assert muscle_force(length, velocity, rings, activation) == pytest.approx(engine, abs=1e-9)
 
 
 def test_scaled_lengths_are_the_engines(rings: Rings) -> None:
@@ -246,18 +239,6 @@ def test_a_diagram_and_the_figure_of_a_network_have_the_same_parts_and_key(netwo
     assert shown == set(drawn_ids(network, tmp_path))
     assert "synapse</text>" in svg
     assert "input current" in svg or not network.inputs
-
-
-def test_figure_6(network: Network, tmp_path: Path) -> None:
-    for suffix in (".svg", ".png", ".pdf"):
-        stem = tmp_path / "figure_6"
-        path = network_diagram.network_figure(network, stem.with_suffix(suffix), conductances=True)
-        assert path.stat().st_size > 5000
-    png = path.with_suffix(".png")
-    assert_two_good_files(png)
-    ids = Counter(node.get("id") for node in ElementTree.parse(png.with_suffix(".svg")).iter() if node.get("id"))
-    for name in network.neurons:
-        assert ids[f"neuron-{name}"] == 1
 
 
 # Figure 9

@@ -9,7 +9,6 @@ import imageio.v3
 import numpy as np
 import pytest
 
-from annelid.draw import plots
 from annelid.draw.canvas import line_looks, segment_colors
 from annelid.draw.plots import figure7
 from annelid.errors import RunFileError
@@ -31,36 +30,6 @@ def test_figure7_is_a_picture_with_curves_on_white(planar_run: Run, picture: Pat
 def test_figure7_of_a_3d_worm_shows_six_sensors(rods_run: Run, picture: Path) -> None:
     assert rods_run.data.sizes["sensor"] == 6
     assert figure7(rods_run, picture).stat().st_size > 10_000
-
-
-def test_published_elongations_end_at_lines_that_are_named(rods_run: Run, picture: Path) -> None:
-    from matplotlib.figure import Figure
-
-    axes = Figure().subplots()
-    plots._lengths(axes, rods_run, line_looks(3))
-    first_helix = 100.0 * rods_run.data["stretch_length"].values[:, :, 0]
-    expected = first_helix.min(axis=0) + np.array([4.20, 2.55, 4.02])
-    levels = [line for line in axes.lines if np.size(line.get_xdata()) == 2 and line.get_linestyle() == "--"]
-    assert sorted(float(np.asarray(line.get_ydata())[0]) for line in levels) == pytest.approx(sorted(expected))
-    named = [text.get_text().removeprefix("paper: ") for text in axes.texts if text.get_text().startswith("paper")]
-    assert sorted(",".join(named).replace(" ", "").split(",")) == ["1", "2", "3"]
-    other = replace(rods_run, config=rods_run.config.model_copy(update={"published": None}))
-    axes = Figure().subplots()
-    plots._lengths(axes, other, line_looks(3))
-    assert [text.get_text() for text in axes.texts] == ["at rest"]
-
-
-def test_the_legend_names_every_segment_or_evenly_spaced_ones_of_many(subtests: pytest.Subtests) -> None:
-    for n_segments in (1, 3, 4, 8, 60):
-        with subtests.test(f"{n_segments!r:.60}"):
-            from matplotlib.figure import Figure
-
-            figure = Figure(layout="constrained")
-            plots._name_segments(figure, line_looks(n_segments), "title")
-            (legend,) = figure.legends
-            named = [int(text.get_text().removeprefix("segment ")) for text in legend.get_texts()]
-            assert (named[0], named[-1]) == (1, n_segments)
-            assert named == list(range(1, n_segments + 1)) or len(named) == 16
 
 
 def test_lines_differ_in_dashes_in_grey_and_for_colour_blind_readers(subtests: pytest.Subtests) -> None:
@@ -99,13 +68,3 @@ def test_a_run_without_samples_is_refused_in_a_sentence(planar_run: Run, picture
     with pytest.raises(RunFileError, match="too little to plot"):
         figure7(empty, picture)
     assert not picture.exists()
-
-
-def test_segments_differ_in_greyscale_when_they_are_few(subtests: pytest.Subtests) -> None:
-    for n_segments in (3, 4, 6, 12, 60):
-        with subtests.test(f"{n_segments!r:.60}"):
-            from matplotlib.colors import to_rgb
-
-            grey = [np.dot(to_rgb(color), (0.299, 0.587, 0.114)) for color in segment_colors(n_segments)]
-            assert len(grey) == n_segments
-            assert np.all(np.diff(grey) > 0), "dark to light from front to rear"

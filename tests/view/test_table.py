@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.console import Console
 
-from annelid.analysis.paper import formulation, published
+from annelid.analysis.paper import formulation
 from annelid.analysis.summary import Summary, summary
 from annelid.config import load_config
 from annelid.draw.table import closing_sentence, legend, summary_rows, summary_table
@@ -115,16 +115,6 @@ def test_a_deviation_is_ours_over_the_reference_less_one(factor: float) -> None:
     _, reference, apart = cells(replace(paper, period_s=factor * paper.period_s), "riddle2023-fast", "period")
     assert reference == f"{paper.period_s:.3f} s"
     assert float(apart.removesuffix(" %")) == pytest.approx(100 * (factor - 1), abs=0.051, rel=0.06)
-
-
-def test_published_figures_of_one_sensor_stand_beside_the_range_over_all() -> None:
-    theirs = published(FAST)["elongation_first_helix_pp_m"].value
-    assert isinstance(theirs, tuple)
-    below = replace(formulation(), elongation_least_pp_m=[0.9 * one for one in theirs])
-    for label in ("elongation, first helix, pp", "least of its sensors", "most of its sensors"):
-        assert cells(below, "riddle2023-fast", label)[1] == "4.20 / 2.55 / 4.02 cm [P]"
-    # One sensor of theirs is no measure of the least of ours.
-    assert cells(below, "riddle2023-fast", "least")[2] == ""
 
 
 def test_rigid_crossings_are_explained_in_the_table_that_compares_them() -> None:

@@ -10,9 +10,7 @@ from __future__ import annotations
 import math
 import tempfile
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -22,6 +20,7 @@ from annelid.analysis import Gait, gait
 from annelid.config import load_config
 from annelid.control import SnsController
 from annelid.control.sns import Sns
+from annelid.experiment import Processes
 from annelid.output import write_csv
 from annelid.protocols import Array, Controller, Sensation
 from annelid.simulation import simulate
@@ -96,7 +95,7 @@ def measured(number: int, step_ms: int) -> list[float]:
 def main() -> None:
     """Measures all worms."""
     rows = []
-    with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
+    with Processes() as pool:
         runs = [[pool.submit(measured, number, step_ms) for step_ms in STEPS_MS] for number in range(len(WORMS))]
         for worm, its in zip(WORMS, runs, strict=True):
             for name, values in zip(worm.numbers, zip(*(run.result() for run in its), strict=True), strict=True):

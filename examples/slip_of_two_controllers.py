@@ -11,41 +11,41 @@ one with a foothold for 95 % of the time, since fast ones glide. Takes some minu
 from __future__ import annotations
 
 import sys
-from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from rich.console import Console
 from rich.table import Table
 
-from annelid import load_config, simulate
+from annelid import Run
+from annelid.experiment import Case, Store
 
-DURATION_S = 12.0
+CLOCK = {"clock.control_timestep_s": 0.002, "record.signals_interval_s": 0.02, "duration_s": 12.0}
 CHANNELS = {f"channel, {cue}": {"kind": "shc", "feedback": cue} for cue in ("contact", "stretch", "none")}
 CONTROLLERS = CHANNELS | {
     f"sine, waves: {waves}, {period_s:g} s": {"kind": "sine", "period_s": period_s, "waves": waves}
     for waves in (1, 2, 3)
     for period_s in (1.0, 2.0, 4.0)
 }
+CASES = {name: Case("daltorio2013", CLOCK | {"controller": fields}) for name, fields in CONTROLLERS.items()}
 
 
-def measure(name: str, folder: Path) -> tuple[str, float, float, float, float]:
-    """Runs one controller: name, forward speed (m/s), slip loss and net muscle work (J/m), share without foothold."""
-    clock = {"clock.control_timestep_s": 0.002, "record.signals_interval_s": 0.02, "duration_s": DURATION_S}
-    config = load_config("daltorio2013", clock | {"controller": CONTROLLERS[name]})
-    data = simulate(config, folder / name, progress=False).data
-    steady = data.isel(time=data["time"] >= DURATION_S / 3)
+def measure(name: str, run: Run) -> tuple[str, float, float, float, float]:
+    """Reads a run: name, forward speed (m/s), slip loss and net muscle work (J/m), share without foothold."""
+    data, duration_s = run.data, run.config.duration_s
+    steady = data.isel(time=data["time"] >= duration_s / 3)
     first, last = steady.isel(time=0), steady.isel(time=-1)
     way = float((first["center_of_mass"] - last["center_of_mass"]).sel(axis="x"))
     slip, work = (float((last[loss] - first[loss]).sum()) for loss in ("slip_loss", "muscle_work"))
     afloat = float((steady["contact_force"].sel(axis="z").max("segment") == 0).mean())
-    return name, way / (DURATION_S * 2 / 3), slip / way, work / way, afloat
+    return name, way / (duration_s * 2 / 3), slip / way, work / way, afloat
 
 
 def main(folder: Path) -> None:
     """Measures all controllers and compares the channel with the sine wave that slips least."""
-    with ProcessPoolExecutor(2) as pool:
-        results = list(pool.map(measure, CONTROLLERS, [folder] * len(CONTROLLERS)))
+    store = Store(folder)
+    store.compute(CASES.values())
+    results = [measure(name, store.run(case)) for name, case in CASES.items()]
     table = Table("controller", "speed (mm/s)", "slip (J/m)", "muscles (J/m)", "no foothold (%)")
     for name, speed, slip, work, afloat in results:
         table.add_row(name, f"{1000 * speed:.1f}", f"{slip:.2g}", f"{work:.1f}", f"{100 * afloat:.0f}")

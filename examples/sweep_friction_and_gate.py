@@ -2,13 +2,11 @@
 
     python examples/sweep_friction_and_gate.py [folder]
 
-Sixteen runs of some seconds each, on all cores; a second call computes none of them again. With the address of a Dask
-scheduler in ANNELID_CLUSTER its workers compute them.
+Sixteen runs of some seconds each, on all cores; a second call computes none of them again.
 """
 
 from __future__ import annotations
 
-import os
 import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -27,9 +25,9 @@ STUDY = {
 }
 
 
-def main(folder: Path, study: dict = STUDY, cluster: str | None = None) -> None:
+def main(folder: Path, study: dict = STUDY) -> None:
     """Runs the sweep and tells the best gate on every friction."""
-    data = annelid.sweep(study, folder, cluster=cluster)
+    data = annelid.sweep(study, folder)
     gate = "controller.gate_time_constant_ms"
     for friction in data["arena.friction"].values:
         here = data.sel({"arena.friction": friction})
@@ -43,9 +41,5 @@ def main(folder: Path, study: dict = STUDY, cluster: str | None = None) -> None:
 
 
 if __name__ == "__main__":
-    where = os.environ.get("ANNELID_CLUSTER")
-    if len(sys.argv) > 1:
-        main(Path(sys.argv[1]), cluster=where)
-    else:
-        with TemporaryDirectory() as temporary:
-            main(Path(temporary), cluster=where)
+    with TemporaryDirectory() as temporary:
+        main(Path(sys.argv[1] if len(sys.argv) > 1 else temporary))

@@ -75,7 +75,7 @@ class InThisProcess(Executor):
 def runs_in_this_process() -> Iterator[None]:
     """Studies compute their runs here; what is special to processes is tested with the workers."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("annelid.experiment.workers.ProcessPoolExecutor", InThisProcess)
+        patch.setattr("annelid.experiment.processes.Processes", InThisProcess)
         yield
 
 

@@ -81,7 +81,7 @@ def test_the_best_gate_of_every_friction_is_told(tmp_path: Path, capsys: pytest.
         {"field": "arena.friction", "values": [0.3]},
         {"field": "controller.gate_time_constant_ms", "values": [150.0]},
     ]
-    module.main(tmp_path, {**module.STUDY, "set": {"duration_s": 0.1}, "vary": vary}, "processes")
+    module.main(tmp_path, {**module.STUDY, "set": {"duration_s": 0.1}, "vary": vary})
     assert capsys.readouterr().out == "friction 0.3: none walks\n"
     assert (tmp_path / "sweep.nc").exists()
 
@@ -195,10 +195,10 @@ def test_soft_worms_leave_the_rigid_tube(tmp_path: Path) -> None:
     assert (tmp_path / "tube.png").stat().st_size > 10_000
 
 
-def test_slip_is_told_for_each_metre(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    slip = example("slip_of_two_controllers")
-    monkeypatch.setattr(slip, "DURATION_S", 0.6)
-    name, speed, slip_J_per_m, work_J_per_m, afloat = slip.measure("channel, contact", tmp_path)
+def test_slip_is_told_for_each_metre(tmp_path: Path) -> None:
+    slip, name = example("slip_of_two_controllers"), "channel, contact"
+    run = annelid.simulate(slip.CASES[name].but({"duration_s": 0.6}).config, tmp_path, progress=False)
+    name, speed, slip_J_per_m, work_J_per_m, afloat = slip.measure(name, run)
     assert name == "channel, contact"
     assert speed > 0
     assert 0 < slip_J_per_m < work_J_per_m

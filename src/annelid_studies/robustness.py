@@ -12,6 +12,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from importlib.resources import files
@@ -19,10 +20,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.stats import binomtest
 
 from annelid.analysis import DESIGN_INTERVAL_S, RhythmScore, lengthening_score, rhythm_score
 from annelid.errors import ConfigError, RunFileError, suggest
-from annelid.experiment import SHEAR_OVER_YOUNG, Case, Store, StudyProgress, Workers, case_key, code_fingerprint
+from annelid.experiment import SHEAR_OVER_YOUNG, Case, Store, StudyProgress, case_key, code_fingerprint
 from annelid.markdown import Table, plain_table
 from annelid.output import write_text
 from annelid.simulation import locks
@@ -134,7 +136,8 @@ def judge(
 
 
 def _made_by(point: Point, controller: str) -> str:
-    return f"{case_key(point.case(controller))} {code_fingerprint(__name__)}"
+    reading = code_fingerprint("annelid.analysis", __name__)
+    return f"{case_key(point.case(controller))} {reading}"
 
 
 @locks("folder")
@@ -145,7 +148,7 @@ def robustness(
     controllers: Sequence[str] = CONTROLLERS,
     n_segments: int | None = None,
     keep: bool = False,
-    workers: Workers | None = None,
+    executor: Executor | None = None,
     progress: StudyProgress | None = None,
 ) -> list[Judged]:
     """Walks the first points of the sample under each controller, as far as the folder does not have their judgement.
@@ -158,7 +161,7 @@ def robustness(
         n_segments: Gives every worm this many segments in place of its own, for a sample of the other quantities
             that costs less; None for the sample as it is.
         keep: Keep what ``robustness.json`` says of points that other versions of the code have run.
-        workers: Who computes the runs; default: a process for each core.
+        executor: Who computes the runs; None for a process of this machine on every core.
         progress: Called before the first and after every run.
 
     Returns:
@@ -184,12 +187,12 @@ def robustness(
     }
     missing = [(kind, i) for i in range(n_points) for kind in controllers if (kind, i) not in judged]
     cases = {(kind, i): chosen[i].case(kind) for kind, i in missing}
-    store, total_s, before_s = Store(folder / "runs", workers), sum(case.cost_s for case in cases.values()), 0.0
+    store, total_s, before_s = Store(folder / "runs", executor), sum(case.cost_s for case in cases.values()), 0.0
 
     def in_order() -> list[Judged]:
         return [judged[key] for key in sorted(judged, key=lambda key: (CONTROLLERS.index(key[0]), key[1]))]
 
-    def judge_what_is_there(lot_s: float, _: int, __: int, share: float) -> None:
+    def judge_what_is_there(lot_s: float, _: str, __: int, ___: int, share: float) -> None:
         for (kind, i), case in cases.items():
             if (kind, i) not in judged and case in store:
                 run = store.run(case)
@@ -234,8 +237,6 @@ def shares(judged: Sequence[Judged]) -> dict[str, dict[str, Any]]:
         For every controller the number of points, of those walked, in time, and in time with their segments lengthening
         in the same order, and the share in time with its 95 % interval after Wilson 1927.
     """
-    from scipy.stats import binomtest
-
     found: dict[str, dict[str, Any]] = {}
     for controller, own in grouped(judged, lambda one: one.controller).items():
         n, good = len(own), sum(one.in_time for one in own)

@@ -6,17 +6,14 @@ import json
 import re
 import subprocess
 import sys
-from concurrent.futures import Future
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from annelid.cli import entry
-from annelid.errors import ConfigError, RunKilled
-from annelid.experiment.attempt import Task, attempt
+from annelid.errors import RunKilled
 from annelid.experiment.sweep import Sweep
-from annelid.experiment.workers import Result, Workers
 from outcome import STUDY, Command
 
 pytestmark = pytest.mark.usefixtures("runs_in_this_process")
@@ -27,17 +24,7 @@ GOOD, BAD = "1.0", "1e4"
 
 @pytest.fixture(autouse=True)
 def _computed_and_not_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Runs are computed in this process, and results get no figure."""
-
-    def submit(_: Workers, task: Task) -> Result:
-        future = Future[bytes | None]()
-        try:
-            future.set_result(attempt(task))
-        except ConfigError as error:
-            future.set_exception(error)
-        return future
-
-    monkeypatch.setattr("annelid.experiment.workers.Processes.submit", submit)
+    """Results get no figure."""
     for figure in ("sweep.sweep_figure", "tune._figure"):
         monkeypatch.setattr(f"annelid.experiment.{figure}", lambda *_: Path("figure.png"))
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +15,8 @@ from annelid.config.run import Trial
 from annelid.control.own import VARIABLE, own_controller
 from annelid.control.trial import SENSORS, Faults, TrialController
 from annelid.errors import ConfigError
-from annelid.experiment import Case, Store, case_key
-from annelid.experiment.fingerprint import foreign_code
-from annelid.experiment.workers import Processes
+from annelid.experiment import Case, Store, case_key, fingerprint
+from annelid.experiment.processes import Processes
 from annelid.protocols import Plant, Sensation
 from annelid.simulation import WormPlant, build_controller, simulate
 from annelid.simulation.batch import simulate_batch
@@ -258,13 +256,14 @@ def test_an_own_controller_runs_also_in_workers(own: str, attribute: str, level:
     assert kind == (f"test-{own}" if attribute == "Kind" else f"{own}:{attribute}")
     assert own_controller(f"{own}:{attribute}") == kind
     case = Case("riddle2022-planar", {"duration_s": 0.02, "controller": {"kind": kind}, "trial.blind": True})
-    store = Store(tmp_path / "runs", Processes(1))
-    with store.workers or nullcontext():
+    with Processes(1) as one:
+        store = Store(tmp_path / "runs", one)
         store.compute([case])
     assert store.run(case).data["activation"].values[-1, 1] == pytest.approx(level)
     before, module = case_key(case), tmp_path / f"{own}.py"
     module.write_text(module.read_text() + "other = 4\n")
-    foreign_code.cache_clear()
+    for function in (fingerprint._code_in, fingerprint.code_fingerprint, fingerprint.physics_fingerprint):
+        function.cache_clear()
     assert case_key(case) != before, "another controller is another run"
 
 

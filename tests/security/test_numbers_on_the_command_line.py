@@ -46,7 +46,7 @@ WITH: dict[str, tuple[str, ...]] = {
     "loop": ("riddle2022-planar", "--servos", "/no/such/port", "-o", "out"),
     "pseudo-robot --duration": ("riddle2022-planar", "--lag", "nan"),
     "pseudo-robot": ("riddle2022-planar", "--duration", "0.1"),
-    "experiment": ("--cluster", "nothing"),
+    "experiment": ("--scheduler", "nothing"),
     "experiment load-frame": ("riddle2022-planar",),
 }
 """What a command needs beside the option, chosen so that a value that is taken ends soon."""

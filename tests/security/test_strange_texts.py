@@ -12,13 +12,13 @@ from pathlib import Path
 import pytest
 
 from annelid import Network, simulate
-from annelid.config import find_cluster, load_config, load_study, parse_assignments
+from annelid.config import load_config, load_study, parse_assignments
 from annelid.errors import AnnelidError, SimulationStopped
 from annelid.experiment.spread import read_spread
 from annelid.nervous import GapJunction, Gate, ModulatorySynapse, Neuron, SpikingSynapse, Synapse
 from annelid.nervous.neurons import Channel, Firing
 from annelid.textfiles import MOST_BYTES, parse_toml
-from annelid_lab.load_frame import read_loop
+from annelid_lab.calibration.load_frame import read_loop
 from annelid_studies.robustness import read_judged
 
 LONGEST_S = 20.0
@@ -70,7 +70,6 @@ def test_strange_toml_is_refused_by_every_reader(tmp_path: Path, subtests: pytes
             if len(text) <= 200_000:
                 refused(lambda: load_study(path))
                 refused(lambda text=text: Network.from_toml(text))
-                refused(lambda: find_cluster(str(path)))
                 refused(lambda: load_config("riddle2023-rods", arena=path))
 
 
@@ -97,7 +96,7 @@ FILES: dict[str, Callable[[Path], object]] = {
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has neither such devices nor such pipes")
 def test_what_is_no_text_file_is_refused_by_every_reader(tmp_path: Path, subtests: pytest.Subtests) -> None:
-    readers = [load_config, load_study, lambda p: find_cluster(str(p)), lambda p: load_config("crawler", arena=p)]
+    readers = [load_config, load_study, lambda p: load_config("crawler", arena=p)]
     for name, make in FILES.items():
         path = tmp_path / f"{name}.toml"
         make(path)

@@ -103,7 +103,7 @@ def left_after(process: subprocess.Popen[str], number: signal.Signals) -> tuple[
 
 @pytest.mark.slow
 def test_workers_end_with_a_killed_sweep(tmp_path: Path) -> None:
-    with sweeping(tmp_path, "--cluster", "processes") as process:
+    with sweeping(tmp_path) as process:
         left, _ = left_after(process, signal.SIGKILL)
         assert left == []
 
@@ -122,10 +122,10 @@ def test_sigterm_ends_a_sweep_as_ctrl_c_does_and_it_opens_no_port(tmp_path: Path
 
 
 @contextmanager
-def sweeping(folder: Path, *options: str) -> Iterator[subprocess.Popen[str]]:
+def sweeping(folder: Path) -> Iterator[subprocess.Popen[str]]:
     """A long sweep that has begun with its first run."""
     (folder / "study.toml").write_text(LONG)
-    with started(["-m", "annelid", "sweep", "study.toml", "--jobs", "1", *options], folder) as process:
+    with started(["-m", "annelid", "sweep", "study.toml", "--jobs", "1"], folder) as process:
         wait_for(lambda: any((folder / "sweep" / "runs").glob(".*/run.nc")), process)
         yield process
 

@@ -57,6 +57,6 @@ def test_a_damaged_note_makes_it_anew(maker: Maker) -> None:
 
 def test_changed_code_makes_it_anew(maker: Maker, monkeypatch: pytest.MonkeyPatch) -> None:
     kept(maker.stem, ["run"], maker)
-    monkeypatch.setattr("annelid_studies.riddle2023.paper.code_fingerprint", lambda: "other code")
+    monkeypatch.setattr("annelid_studies.riddle2023.paper.code_fingerprint", lambda *_: "other code")
     kept(maker.stem, ["run"], maker)
     assert maker.times == 2

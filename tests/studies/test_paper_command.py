@@ -10,7 +10,6 @@ from typing import Any
 
 import pytest
 
-from annelid.experiment import Workers
 from annelid.experiment.progress import LINE_EVERY_S, Lines, TimeLeft, study_progress
 from annelid_studies.riddle2023.contents import Claim, Report, Table
 from annelid_studies.worms import Effort
@@ -28,10 +27,8 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> Asked:
     """Puts a report in the place of the runs; returns with what it was asked for."""
     calls: Asked = []
 
-    def reproduce(
-        folder: Path, effort: Effort, *, only: Sequence[str] | None, workers: Workers, progress: Any
-    ) -> Report:
-        calls.append((folder, effort, only, workers.slots()))
+    def reproduce(folder: Path, effort: Effort, *, only: Sequence[str] | None, executor: Any, progress: Any) -> Report:
+        calls.append((folder, effort, only, executor._max_workers))
         if progress is not None:
             progress("running worms", 1, 2, 0.5)
         return REPORT

@@ -53,7 +53,7 @@ def test_one_examination_alone_makes_a_report_of_its_own(tmp_path: Path) -> None
 @pytest.mark.usefixtures("tiny")
 def test_a_second_call_runs_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     first = paper.reproduce(tmp_path, "quick", only=["tiny"])
-    monkeypatch.setattr("annelid.experiment.workers.ProcessPoolExecutor", None)
+    monkeypatch.setattr("annelid.experiment.store.attempt", None)
     assert paper.reproduce(tmp_path, "quick", only=["tiny"]).main_table == first.main_table
 
 

@@ -7,7 +7,6 @@ import dataclasses
 import json
 import re
 import tempfile
-from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +21,6 @@ from annelid.analysis import Gait, Summary
 from annelid.analysis.gait import EnergyBalance
 from annelid.config import Study, load_study, unit_of
 from annelid.errors import ConfigError
-from annelid.experiment.attempt import attempt
 from annelid.experiment.numbers import NUMBERS
 from annelid.experiment.space import unit_samples
 from annelid.experiment.sweep import (
@@ -38,7 +36,6 @@ from annelid.experiment.sweep import (
     to_check,
     write_results,
 )
-from annelid.experiment.workers import Result, Workers
 from annelid.simulation.runfile import FILE_NAME
 
 pytestmark = pytest.mark.usefixtures("runs_in_this_process")
@@ -50,29 +47,6 @@ LISTED = [{"field": SEGMENTS, "values": [3, 4]}, {"field": "controller.scheme", 
 
 def study(vary: Any = LISTED, **fields: Any) -> Study:
     return load_study({"preset": "riddle2022-planar", "set": {"duration_s": 0.2}, "vary": vary, **fields})
-
-
-class Here(Workers):
-    """Computes in this process."""
-
-    def slots(self) -> int:
-        return 1
-
-    def submit(self, task: Any) -> Result:
-        future: Result = Future()
-        try:
-            future.set_result(attempt(task))
-        except ConfigError as error:
-            future.set_exception(error)
-        return future
-
-    def close(self, *, drop: bool) -> None:
-        """Nothing to let go."""
-
-
-@pytest.fixture(autouse=True)
-def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("annelid.experiment.sweep.workers_of", lambda cluster, jobs: Here())
 
 
 @st.composite
@@ -193,7 +167,7 @@ def test_what_is_no_study_is_refused_in_a_sentence(subtests: pytest.Subtests, tm
         ({"outputs": ["period_s"], "rank": "travel_m"}, "rank = 'travel_m': must be one of the outputs"),
         ({"rank": "contact_duty"}, "rank = 'contact_duty'"),
         ({"keep": "all"}, "keep = 'all': must be one of"),
-        ({"cluster": {"kind": "slurm", "jobs": 0}}, "cluster.jobs = 0: must be at least 1"),
+        ({"cluster": {"kind": "slurm"}}, "a study names no cluster any more: leave it out, and give --scheduler"),
         ({"vary": [{"field": "body.gain", "values": [-1.0, -2.0]}]}, "body.gain = -1.0"),
     ):
         with subtests.test(f"{fields!r:.60}"):
@@ -234,12 +208,9 @@ REFUSED = [{"field": "body.gain", "values": [1.31, 1e4, -1.0]}, LISTED[0]]
 
 
 @pytest.fixture(scope="module")
-def done(tmp_path_factory: pytest.TempPathFactory) -> Sweep:
+def done(tmp_path_factory: pytest.TempPathFactory, runs_in_this_process: None) -> Sweep:
     """Six runs twice, of which some are refused by the plant, others by the configuration."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("annelid.experiment.sweep.workers_of", lambda cluster, jobs: Here())
-        wanted = study(REFUSED, repeats=2, rank="ring_length_min_m")
-        return swept(wanted, tmp_path_factory.mktemp("sweep"))
+    return swept(study(REFUSED, repeats=2, rank="ring_length_min_m"), tmp_path_factory.mktemp("sweep"))
 
 
 def test_the_dataset_is_labelled_and_every_run_in_it_once(done: Sweep) -> None:

@@ -406,7 +406,7 @@ def test_no_error_of_the_parameters_is_no_error_bar_and_costs_no_run(tiny: Uncer
 def test_an_interrupted_study_goes_on(tmp_path: Path) -> None:
     config, folder = load_config(RODS, SHORT | {"body.mesh.elements_per_side": 1}), tmp_path / "run"
 
-    def stop_after_two(finished: int, _total: int, _share: float) -> None:
+    def stop_after_two(_stage: str, finished: int, _total: int, _share: float) -> None:
         if finished >= 2:
             raise KeyboardInterrupt
 

@@ -66,14 +66,12 @@ ArenaName = Annotated[
 Jobs = Annotated[
     int | None, typer.Option(min=1, max=4096, help="Runs at a time.  [default: as many as there are cores]")
 ]
-ClusterName = Annotated[
+SchedulerAddress = Annotated[
     str | None,
     typer.Option(
-        "--cluster",
-        metavar="WHERE",
-        envvar="ANNELID_CLUSTER",
-        help="Where runs are computed: processes (of this machine), slurm, the address or the scheduler file (.json) of"
-        " a Dask scheduler, or a TOML file with a table [cluster]: name only what you trust  [default: processes]",
+        metavar="ADDRESS",
+        help="Have a Dask scheduler's workers compute the runs: tcp://HOST:PORT, tls://HOST:PORT, or its scheduler"
+        " file (.json). It runs code as you: name only what you trust  [default: processes of this machine]",
     ),
 ]
 Output = Annotated[Path, typer.Option("--output", "-o", help="Folder of the results and the runs.")]
@@ -85,7 +83,7 @@ Force = Annotated[bool, typer.Option("--force", help="Replace an output file tha
 
 
 @contextmanager
-def kept_runs(output: Path, *, jobs: int | None, cluster: str | None, quiet: bool) -> Iterator[Store]:
+def kept_runs(output: Path, *, jobs: int | None, quiet: bool, scheduler: str | None = None) -> Iterator[Store]:
     """Gives the store of a study's runs, ``runs`` in its folder, with its workers and its progress display.
 
     Other writers are kept out of the folder.
@@ -93,18 +91,23 @@ def kept_runs(output: Path, *, jobs: int | None, cluster: str | None, quiet: boo
     Args:
         output: Folder of the study's results.
         jobs: Runs at a time, or None.
-        cluster: Where runs are computed, or None.
+        scheduler: Address of a Dask scheduler, or None for processes of this machine.
         quiet: Whether progress is not shown.
+
+    Raises:
+        BadParameter: Both jobs and a scheduler are given.
     """
-    from annelid.config import find_cluster
-    from annelid.experiment.cluster import workers_of
+    from annelid.experiment.processes import Processes
     from annelid.experiment.progress import study_progress
+    from annelid.experiment.scheduler import joined
     from annelid.experiment.store import Store
 
+    if scheduler is not None and jobs is not None:
+        raise typer.BadParameter("--jobs is for processes of this machine: leave it out with --scheduler")
     lock(output)
-    named = workers_of(find_cluster("processes" if cluster is None else cluster), jobs)
-    with going_on(output / "runs"), named as workers, study_progress(quiet=quiet) as progress:
-        yield Store(output / "runs", workers, progress=progress)
+    workers = Processes(jobs) if scheduler is None else joined(scheduler)
+    with going_on(output / "runs"), workers as executor, study_progress(quiet=quiet) as progress:
+        yield Store(output / "runs", executor, progress=progress)
 
 
 @contextmanager

@@ -154,14 +154,13 @@ def run_command(
             done = simulate(config, folder, resume=resume, progress=progress, overwrite=force)
         else:
             from annelid.experiment import uncertainty as study
-            from annelid.experiment.progress import in_stage, study_progress
+            from annelid.experiment.progress import study_progress
 
             spread = study.read_spread(uncertainty_from).but(_errors(vary))
             further = ["--out", str(folder)] if out is None else []
             with going_on(folder, *further), study_progress(quiet=quiet) as shown:
-                report = in_stage(shown, "error bars")
                 result = study.uncertainty(
-                    config, uncertainty, folder, spread=spread, jobs=jobs, overwrite=force, progress=report
+                    config, uncertainty, folder, spread=spread, jobs=jobs, overwrite=force, progress=shown
                 )
             done = open_run(folder)
     except SimulationStopped as stop:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -11,17 +10,16 @@ import typer
 from annelid.cli.common import (
     RIGID_PRESET,
     Assignments,
-    ClusterName,
     Jobs,
     NamedPreset,
     Output,
     Quiet,
-    going_on,
+    SchedulerAddress,
     kept_runs,
     overrides_of,
     print_results,
 )
-from annelid.cli.entry import EXIT_ALL_FAILED, command, complain, end_study, lock, typed_command
+from annelid.cli.entry import EXIT_ALL_FAILED, command, complain, end_study, typed_command
 from annelid.cli.result import refuse_json
 
 
@@ -31,7 +29,7 @@ def sweep_command(
         Path | None, typer.Argument(metavar="STUDY.toml", help="What is varied, and how; --example prints one.")
     ] = None,
     output: Output = Path("sweep"),
-    cluster: ClusterName = None,
+    scheduler: SchedulerAddress = None,
     jobs: Jobs = None,
     samples: Annotated[
         int | None, typer.Option(min=1, max=1_000_000, help="Samples to draw.  [default: as the study has it]")
@@ -47,16 +45,13 @@ def sweep_command(
 ) -> None:
     """Vary fields over a grid or in samples.
 
-    Runs are computed on this machine or on a cluster.
-
     A study names a preset, fields that are the same in every run, and fields that are varied: over numbers, choices or
     ranges, in every combination or as random, Latin hypercube or Sobol samples.
 
     Writes sweep.nc, one labelled dataset with every number of summary and gait; sweep.csv, one row per run; sweep.png
     and .svg. Runs are kept: a second call computes what is missing or has failed, one with more samples adds to them. A
     run that cannot be built, or whose workers die again and again, is listed with its reason, and the sweep goes on.
-    Needs the extra: pip install 'annelid[sweep]'; docs/sweeps.md has several machines and Slurm. A cluster that the
-    study describes is used where --cluster names the file.
+    Several machines need the extra: pip install 'annelid[sweep]'; docs/sweeps.md has them, and Slurm.
 
     With --check N, N complete runs, spread evenly over the sweep, run also at half the step and with one more element a
     side. A sentence at the end says which of them are not resolved; the column check of sweep.csv says what moves, and
@@ -65,8 +60,7 @@ def sweep_command(
     \b
     annelid sweep --example > study.toml
     annelid sweep study.toml
-    annelid sweep study.toml --cluster tcp://10.0.0.1:8786
-    annelid sweep study.toml --cluster study.toml
+    annelid sweep study.toml --scheduler tcp://10.0.0.1:8786
     annelid sweep study.toml --samples 512
     annelid sweep study.toml --check 4                 do its results depend on step and mesh?
     """
@@ -79,16 +73,13 @@ def sweep_command(
     if study is None:
         raise typer.BadParameter("name a study: annelid sweep --example > study.toml  makes one to begin with")
     from annelid.config import load_study
-    from annelid.experiment.progress import study_progress
     from annelid.experiment.sweep import checked_sentence, results_table, swept, write_results
 
     loaded = load_study(study)
     if samples is not None:
         loaded = load_study(loaded.model_dump(by_alias=True) | {"samples": samples})
-    lock(output)
-    with going_on(output / "runs"), study_progress(quiet=quiet) as progress:
-        to_use = f"add --cluster {shlex.quote(str(study))}"
-        done = swept(loaded, output, cluster=cluster, jobs=jobs, check=check, progress=progress, to_use=to_use)
+    with kept_runs(output, jobs=jobs, scheduler=scheduler, quiet=quiet) as store:
+        done = swept(loaded, output, executor=store.executor, check=check, progress=store.progress)
     sentences = [checked_sentence(done)] if check else []
     results = {"check": {i: one.to_dict() for i, one in done.checks.items()}} if check else {}
     print_results(write_results(done), results_table(done), *sentences, quiet=quiet, results=results)
@@ -128,7 +119,7 @@ def tune_command(
         ),
     ] = None,
     jobs: Jobs = None,
-    cluster: ClusterName = None,
+    scheduler: SchedulerAddress = None,
     quiet: Quiet = False,
 ) -> None:
     """Search for a faster, cheaper or less slipping gait.
@@ -158,7 +149,7 @@ def tune_command(
     task = tune.Task(preset, changes, tune.parsed_variables(vary or [], base), objectives, trials, seed, numerics)
     found: list[tune.Trial] = []
     written: list[Path] = []
-    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+    with kept_runs(output, jobs=jobs, scheduler=scheduler, quiet=quiet) as store:
         for generation in tune.search(task, store):
             found += generation
             written = tune.write_results(task, found, typed_command(), output)

@@ -9,12 +9,14 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, model_validator
 
 from annelid.config.checking import check_section
-from annelid.config.cluster import Cluster
 from annelid.config.sections import Line, Section, Seed
+from annelid.errors import ConfigError, shown
 from annelid.textfiles import check_depth, read_toml
 
 Design = Literal["grid", "random", "lhs", "sobol"]
 MOST_RUNS = 100_000
+INSTEAD = "leave it out, and give --scheduler ADDRESS, or executor= in Python; docs/sweeps.md has Slurm"
+"""What replaced clusters that a study describes."""
 HOW = "give values = [..], choices = [..], or from, to and, in a grid, number"
 
 
@@ -74,7 +76,6 @@ class Study(Section):
     outputs: tuple[str, ...] = Field(default=(), description="numbers that are kept; all where it is left out")
     rank: str | None = Field(default=None, description="the number that the table and the figure tell first")
     keep: Literal["runs", "outcomes"] = Field(default="runs", description="all files of every run, or its numbers only")
-    cluster: Cluster | None = Field(default=None, description="used only where the user names it on the command line")
 
     @model_validator(mode="after")
     def _samples_are_not_of_a_grid(self) -> Self:
@@ -109,5 +110,9 @@ def load_study(source: str | Path | Mapping[str, Any] | Study) -> Study:
         return source
     if isinstance(source, Mapping):
         check_depth(source, "the study")
-        return check_section(Study, source)
-    return check_section(Study, {"name": Path(source).stem, **read_toml(Path(source), "the study")})
+        tree = source
+    else:
+        tree = {"name": Path(source).stem, **read_toml(Path(source), "the study")}
+    if "cluster" in tree:
+        raise ConfigError(f"cluster = {shown(tree['cluster'])}: a study names no cluster any more: {INSTEAD}")
+    return check_section(Study, tree)

@@ -19,13 +19,12 @@ from annelid.lazy import lazy
 if TYPE_CHECKING:
     from annelid.experiment.case import SHEAR_OVER_YOUNG, Case, write_worm
     from annelid.experiment.check import Check, check, compare, finer_steps, more_elements, refinements
-    from annelid.experiment.fingerprint import code_fingerprint, physics_fingerprint
-    from annelid.experiment.lifeline import end_after
+    from annelid.experiment.fingerprint import code_fingerprint, physics_fingerprint, room_of
     from annelid.experiment.outcome import Hold, Outcome
+    from annelid.experiment.processes import Processes, answers, end_after
     from annelid.experiment.progress import StudyProgress, study_progress
     from annelid.experiment.store import Store, case_key
     from annelid.experiment.tune import START, Judged, judge, numerical_problem
-    from annelid.experiment.workers import Workers
 
 __all__ = [
     "SHEAR_OVER_YOUNG",
@@ -35,9 +34,10 @@ __all__ = [
     "Hold",
     "Judged",
     "Outcome",
+    "Processes",
     "Store",
     "StudyProgress",
-    "Workers",
+    "answers",
     "case_key",
     "check",
     "code_fingerprint",
@@ -49,6 +49,7 @@ __all__ = [
     "numerical_problem",
     "physics_fingerprint",
     "refinements",
+    "room_of",
     "study_progress",
     "write_worm",
 ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -16,9 +17,9 @@ from annelid.errors import ConfigError, listed
 from annelid.experiment.case import Case
 from annelid.experiment.numbers import NUMBERS
 from annelid.experiment.outcome import Outcome, outcome
+from annelid.experiment.processes import workers
 from annelid.experiment.progress import StudyProgress
 from annelid.experiment.store import Store, case_key
-from annelid.experiment.workers import Processes
 from annelid.output import write_json
 from annelid.simulation.lock import locks
 from annelid.simulation.loop import simulate
@@ -233,6 +234,7 @@ def check(
     config: RunConfig,
     folder: str | Path,
     *,
+    executor: Executor | None = None,
     jobs: int | None = None,
     overwrite: bool = False,
     run_progress: bool | ProgressCallback | None = False,
@@ -243,7 +245,8 @@ def check(
     Args:
         config: Any worm; what a planar one or a chain has no finer form of is left out, and the check says so.
         folder: Folder of the run, ``run.nc``; the finer runs are kept in ``check`` below it, and a second call goes on.
-        jobs: Processes of the finer runs, by default as many as there are cores.
+        executor: Who computes the finer runs; None for processes of this machine.
+        jobs: How many processes, by default one a core.
         overwrite: Allow a folder that has something else in it, and replace its ``run.nc``.
         run_progress: Of the run itself, as `annelid.simulate` takes it.
         progress: Called as the finer runs are done.
@@ -272,12 +275,12 @@ def check(
             raise KeyboardInterrupt
         done.append(run)
 
-    def report(n_done: int, total: int, share: float) -> None:
+    def report(stage: str, n_done: int, total: int, share: float) -> None:
         if done and progress is not None:
-            progress("check", n_done, total, share)
+            progress(stage, n_done, total, share)
 
-    with Processes(jobs) as workers:
-        outcomes = Store(folder / RUNS, workers).compute(cases, progress=report, meanwhile=run_itself)
+    with workers(executor, jobs) as given:
+        outcomes = Store(folder / RUNS, given).compute(cases, "check", progress=report, meanwhile=run_itself)
     found = compare(
         outcome(done[0]),
         {one: outcomes[case_key(case)] for one, case in zip(finer, cases, strict=True)},

@@ -10,7 +10,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from annelid.errors import AnnelidError, ConfigError, RunFileError
-from annelid.experiment.attempt import OUTCOME_NAME
+from annelid.experiment.outcome import OUTCOME_NAME
 from annelid.simulation.lock import LOCK_NAME, locked
 from annelid.simulation.runfile import FILE_NAME, STATUSES, read_config
 from annelid.textfiles import parse_json

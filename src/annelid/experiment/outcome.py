@@ -10,7 +10,10 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from annelid.analysis import Gait, RhythmScore, Summary, gait, rhythm_score, summary
+from annelid.experiment.fingerprint import READERS, code_fingerprint
 from annelid.simulation.runfile import Run
+
+OUTCOME_NAME = "outcome.json"
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,21 +71,21 @@ def outcome(run: Run) -> Outcome:
     )
 
 
-def write_outcome(read: Outcome, path: Path, reader: str) -> None:
-    """Writes an outcome as JSON, with the mark of the code that read it."""
-    content = {"reader": reader, **asdict(read)}
+def write_outcome(read: Outcome, path: Path) -> None:
+    """Writes an outcome as JSON, with the mark of this code, which read it."""
+    content = {"reader": code_fingerprint(*READERS), **asdict(read)}
     del content["path"]
     path.write_text(json.dumps(content, allow_nan=False), encoding="utf-8")
 
 
-def read_outcome(path: Path, reader: str) -> Outcome:
-    """Reads an outcome; a ValueError where its file is damaged, or other code read the run than ``reader``."""
+def read_outcome(path: Path) -> Outcome:
+    """Reads an outcome; a ValueError where its file is damaged, or other code than this read the run."""
     try:
         content = _Written.model_validate_json(path.read_bytes())
     except ValidationError as error:
         wrong = error.errors(include_url=False, include_context=False, include_input=False)[0]
         raise ValueError(f"{path} is no outcome: {'.'.join(map(str, wrong['loc']))}: {wrong['msg']}") from None
-    if content.reader != reader:
+    if content.reader != code_fingerprint(*READERS):
         raise ValueError(f"{path} was read by other code")
     return Outcome(path.parent, **{name: value for name, value in content if name != "reader"})
 

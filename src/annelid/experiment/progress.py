@@ -6,7 +6,6 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import partial
 from typing import TextIO
 
 from annelid.simulation.progress import clock_text
@@ -15,16 +14,6 @@ StudyProgress = Callable[[str, int, int, float], object]
 """Called with the stage, the number of its runs done, their total, and the share of its work that is done."""
 
 LINE_EVERY_S = 10.0
-
-
-def in_stage(progress: StudyProgress | None, stage: str) -> Callable[[int, int, float], object] | None:
-    """Returns what a store of runs calls as one stage goes on, or None where nobody wants to know.
-
-    Args:
-        progress: Of the whole study.
-        stage: Name of the stage.
-    """
-    return None if progress is None else partial(progress, stage)
 
 
 @contextmanager

@@ -1,42 +1,47 @@
-"""The store of runs: computed in parallel, each kept in a folder named by all that it depends on.
+"""The store of runs: maps configurations to kept results by the digest of all that these depend on.
 
-A run is there or it is not: a folder gets its name once its outcome is written, which happens last. So a second call
-computes nothing, a killed one loses the runs in progress and no other, and changed code makes new folders.
+Any `concurrent.futures.Executor` computes them. A run is computed in a folder of its own, which gets its name once
+its outcome is written, which happens last. So a second call computes nothing, a killed one loses the runs in progress
+and no other, and changed code makes new folders.
 """
 
 from __future__ import annotations
 
-import hashlib
+import platform
 import shutil
+import tempfile
 import uuid
 from collections.abc import Callable, Iterable, Iterator, Mapping, MutableMapping, Sequence
-from contextlib import nullcontext
+from concurrent.futures import Executor
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from annelid.config.kinds import kinds_in
-from annelid.errors import AnnelidError, ConfigError
-from annelid.experiment.attempt import (
-    DRAFTS,
-    MARK_NAME,
-    Keep,
-    Task,
-    fetch_results,
-    own_code,
-    run_of_draft,
-    stored_outcome,
+from annelid.config import RunConfig
+from annelid.errors import (
+    MOST_LISTED,
+    AnnelidError,
+    ClusterError,
+    ConfigError,
+    RunFileError,
+    SimulationStopped,
+    shortened,
 )
 from annelid.experiment.case import Case
-from annelid.experiment.fingerprint import foreign_code, physics_fingerprint
-from annelid.experiment.outcome import Outcome
-from annelid.experiment.progress import StudyProgress, in_stage
-from annelid.experiment.workers import Processes, Workers
+from annelid.experiment.fingerprint import run_key
+from annelid.experiment.outcome import OUTCOME_NAME, Outcome, outcome, read_outcome, write_outcome
+from annelid.experiment.processes import answers, workers
+from annelid.experiment.progress import StudyProgress
 from annelid.plausibility import refuse_nonsense
-from annelid.simulation.runfile import Run, open_run
+from annelid.simulation.runfile import FILE_NAME, Run, open_run
 
-Progress = Callable[[int, int, float], object]
-"""Called with the number of runs done, their total, and the share of the work that is done."""
+MOST_BYTES = 4 * 2**30
+"""How large a run may be that a worker sends, bytes."""
+MARK_NAME = ".store"
+"""A store's mark: a worker that reads it in the store's folder shares the file system."""
+DRAFTS = ".*.part"
+"""Folders of runs in progress."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,29 +78,32 @@ class Store:
     """A folder of runs, which is made when the first run is computed."""
 
     def __init__(
-        self, folder: Path, workers: Workers | None = None, keep: Keep = "runs", progress: StudyProgress | None = None
+        self,
+        folder: Path,
+        executor: Executor | None = None,
+        keep: Literal["runs", "outcomes"] = "runs",
+        progress: StudyProgress | None = None,
     ) -> None:
         """Opens a store.
 
         Args:
             folder: The folder.
-            workers: Who computes its runs; None for a process of this machine on every core.
+            executor: Who computes its runs; None for a process of this machine on every core.
             keep: ``"runs"``, or ``"outcomes"`` to keep their numbers only.
-            progress: Called as runs go on, with what `compute` names their stage; None for nothing.
+            progress: Called as runs go on; None for nothing.
         """
-        self.folder, self.workers, self.progress = folder, workers, progress
-        self._keep: Keep = keep
+        self.folder, self.executor, self.progress, self._whole = folder, executor, progress, keep == "runs"
 
     def path(self, case: Case) -> Path:
         """Folder of a case's run."""
         return self.folder / f"{case.stem}-{case_key(case)}"
 
     def __contains__(self, case: Case) -> bool:
-        return self._stored(case) is not None
+        return self._kept(case) is not None
 
     def __getitem__(self, case: Case) -> Outcome:
         """Outcome of a case that has been computed; a KeyError if it has not."""
-        found = self._stored(case)
+        found = self._kept(case)
         if found is None:
             raise KeyError(case.command)
         return found
@@ -108,23 +116,20 @@ class Store:
         """
         return open_run(self.path(case))
 
-    def _stored(self, case: Case) -> Outcome | None:
-        return stored_outcome(self.path(case), self._keep)
-
     def compute(
         self,
         cases: Iterable[Case],
         stage: str = "",
         *,
-        progress: Progress | None = None,
+        progress: StudyProgress | None = None,
         failed: MutableMapping[str, Exception] | None = None,
         meanwhile: Callable[[], object] = lambda: None,
     ) -> Mapping[str, Outcome]:
-        """Runs those cases that are not there yet, the longest first, several at a time.
+        """Runs those cases that are not there yet, the longest first.
 
         Args:
             cases: The cases; a case given twice runs once.
-            stage: What is done, in a few words, for the store's ``progress``.
+            stage: What is done, in a few words.
             progress: Called at the start and after every run, in place of the store's own.
             failed: Takes the error of every run that cannot be computed, by its `case_key`; None has the first such run
                 end the call.
@@ -140,33 +145,44 @@ class Store:
             KeyboardInterrupt: Runs in progress are dropped, all others kept.
         """
         wanted = {case_key(case): case for case in cases}
-        found = {key: stored for key, case in wanted.items() if (stored := self._stored(case)) is not None}
-        missing = sorted((wanted[key] for key in wanted if key not in found), key=lambda case: -case.cost_s)
-        total_s = sum(case.cost_s for case in missing)
-        left_s, done = total_s, len(found)
-        progress = progress or in_stage(self.progress, stage)
+        found = {key: kept for key, case in wanted.items() if (kept := self._kept(case)) is not None}
+        missing = sorted((key for key in wanted if key not in found), key=lambda key: -wanted[key].cost_s)
+        errors = {} if failed is None else failed
+        left_s = total_s = sum(wanted[key].cost_s for key in missing)
 
         def report() -> None:
-            if progress is not None:
-                progress(done, len(wanted), 1.0 - left_s / total_s if total_s else 1.0)
+            text = f"{stage}, {len(errors)} failed" if errors else stage
+            share = 1.0 - left_s / total_s if total_s else 1.0
+            (progress or self.progress or _nobody)(text, len(found) + len(errors), len(wanted), share)
 
         report()
         if not missing:
             meanwhile()
             return found
-        with Processes() if self.workers is None else nullcontext(self.workers) as workers:
-            for case, error in self._computed(workers, missing, meanwhile):
-                left_s, done = left_s - case.cost_s, done + 1
-                if error is None:
-                    found[case_key(case)] = self[case]
-                elif failed is None:
-                    raise error
-                else:
-                    failed[case_key(case)] = error
+        home, mark = self.folder.resolve(), self._mark()
+        calls = (
+            (attempt, key, wanted[key].config.model_dump_json(), str(home / self.path(wanted[key]).name), mark)
+            for key in missing
+        )
+        with workers(self.executor) as executor:
+            for number, answer in answers(executor, calls, meanwhile):
+                key, case = missing[number], wanted[missing[number]]
+                try:
+                    if (content := answer()) is not None:
+                        fetch_run(content, self.path(case), case.config)
+                    found[key] = self[case]
+                    if not self._whole:
+                        (self.path(case) / FILE_NAME).unlink(missing_ok=True)
+                except Exception as error:
+                    if failed is None or isinstance(error, ClusterError):
+                        raise
+                    errors[key] = error
+                left_s -= case.cost_s
                 report()
         # What killed attempts have left of runs that are there now.
         for draft in self.folder.glob(DRAFTS):
-            if stored_outcome(run_of_draft(draft), self._keep) is not None:
+            name = draft.name.removeprefix(".").rsplit(".", 2)[0]
+            if stored_outcome(draft.with_name(name), whole=self._whole) is not None:
                 shutil.rmtree(draft, ignore_errors=True)
         return {key: found[key] for key in wanted if key in found}
 
@@ -181,20 +197,16 @@ class Store:
         Returns:
             What became of every case, in their order.
         """
-        report: StudyProgress = progress or self.progress or (lambda *_: None)
         refused: dict[int, ConfigError] = {}
+        failed: dict[str, Exception] = {}
         for i, case in enumerate(cases):
-            report("checking the runs", i, len(cases), i / len(cases))
+            (progress or self.progress or _nobody)("checking the runs", i, len(cases), i / len(cases))
             try:
                 refuse_nonsense(case.config)
             except ConfigError as error:
                 refused[i] = error
-        failed: dict[str, Exception] = {}
-        outcomes = self.compute(
-            [case for i, case in enumerate(cases) if i not in refused],
-            progress=lambda *state: report(f"{stage}, {len(failed)} failed" if failed else stage, *state),
-            failed=failed,
-        )
+        usable = [case for i, case in enumerate(cases) if i not in refused]
+        outcomes = self.compute(usable, stage, progress=progress, failed=failed)
         return [
             Done(None, refused[i], True)
             if i in refused
@@ -202,30 +214,142 @@ class Store:
             for i, case in enumerate(cases)
         ]
 
-    def _computed(
-        self, workers: Workers, missing: Sequence[Case], meanwhile: Callable[[], object]
-    ) -> Iterator[tuple[Case, Exception | None]]:
-        """Has runs computed, and yields each as it is there or has failed."""
+    def _kept(self, case: Case) -> Outcome | None:
+        return stored_outcome(self.path(case), whole=self._whole)
+
+    def _mark(self) -> str:
+        """Makes the folder if it is not there, and returns its mark."""
         self.folder.mkdir(parents=True, exist_ok=True)
         marked = self.folder / MARK_NAME
         if not marked.exists():
             marked.write_text(uuid.uuid4().hex, encoding="utf-8")
-        home, mark, code = str(self.folder.resolve()), marked.read_text(encoding="utf-8"), own_code()
+        return marked.read_text(encoding="utf-8")
 
-        def task_of(number: int) -> Task:
-            case = missing[number]
-            return Task(self.path(case).name, case.config.model_dump_json(), code, home, mark, self._keep)
 
-        def take(number: int, content: bytes | None) -> None:
-            if content is not None:
-                fetch_results(content, self.path(missing[number]), missing[number].config, self._keep)
-
-        for number, error in workers.computed(len(missing), task_of, take, meanwhile):
-            yield missing[number], error
+def _nobody(*_: object) -> None:
+    """Takes no note of how far a study has come."""
 
 
 def case_key(case: Case) -> str:
-    """Digest of all that a run depends on: its configuration, the code that computes it, and the engine."""
-    foreign = "".join(sorted(foreign_code(kind) for kind in kinds_in(case.config)))
-    text = case.config.model_dump_json(exclude={"summary", "published"}) + physics_fingerprint() + foreign
-    return hashlib.sha256(text.encode()).hexdigest()[:16]
+    """Digest of all that a case's run depends on (`fingerprint.run_key`)."""
+    return run_key(case.config)
+
+
+def attempt(key: str, config_json: str, folder: str, mark: str) -> bytes | None:
+    """Computes a run in a worker and publishes it in its store.
+
+    A run that a guard stops is no error; an interrupted one is a KeyboardInterrupt.
+
+    Args:
+        key: The run's key.
+        config_json: Its configuration.
+        folder: Where it goes, absolute.
+        mark: The store's mark.
+
+    Returns:
+        The file of the run where this machine does not see the store's folder.
+    """
+    config, home = RunConfig.model_validate_json(config_json), Path(folder)
+    if run_key(config) != key:
+        raise ClusterError(
+            f"the worker on {platform.node()} has other code: install the same versions of Python, annelid, "
+            "mujoco-core and numpy as on this machine"
+        )
+    try:
+        shared = (home.parent / MARK_NAME).read_text(encoding="utf-8") == mark
+    except OSError:
+        shared = False
+    if not shared:
+        with tempfile.TemporaryDirectory(prefix="annelid-") as away:
+            compute_run(config, Path(away))
+            return (Path(away) / FILE_NAME).read_bytes()
+    try:
+        with _draft_of(home) as draft:
+            compute_run(config, draft)
+    except (OSError, RunFileError):
+        # Where another attempt has won, this one's folder may have been cleared away under it.
+        if stored_outcome(home) is None:
+            raise
+    return None
+
+
+def fetch_run(content: object, folder: Path, config: RunConfig) -> None:
+    """Publishes a run that a worker elsewhere sent, once its file is seen to be whole and of this run."""
+    if not isinstance(content, bytes) or len(content) > MOST_BYTES:
+        raise ClusterError(f"a worker sent no run for {folder.name}: it must be a file of at most {MOST_BYTES:,} bytes")
+    with _draft_of(folder) as draft:
+        draft.mkdir()
+        (draft / FILE_NAME).write_bytes(content)
+        try:
+            sent = open_run(draft)
+            if sent.config.model_dump_json() != config.model_dump_json():
+                raise ConfigError("it is another one")
+            keep_outcome(sent)
+        except OSError:
+            raise
+        # What a file of others raises depends on what is wrong with it.
+        except Exception as error:
+            raise ClusterError(
+                f"a worker sent no run for {folder.name}: {shortened(str(error), MOST_LISTED)}"
+            ) from None
+
+
+def compute_run(config: RunConfig, folder: Path) -> None:
+    """Runs a configuration into a folder and writes its outcome beside it."""
+    from annelid.simulation.loop import simulate
+
+    try:
+        run = simulate(config, folder, progress=False, overwrite=True)
+    except SimulationStopped:
+        # A run that a guard stops is a finding, not a failure.
+        run = open_run(folder)
+    if run.status == "interrupted":
+        raise KeyboardInterrupt
+    keep_outcome(run)
+
+
+def keep_outcome(run: Run) -> Outcome:
+    """Reads the outcome of a run, and writes it beside the run."""
+    read, path = outcome(run), run.path.with_name(OUTCOME_NAME)
+    draft = new_draft(path)
+    write_outcome(read, draft)
+    draft.replace(path)
+    return read
+
+
+def stored_outcome(folder: Path, *, whole: bool = True) -> Outcome | None:
+    """Returns the outcome of a folder's run; None where there is none, or, if it must be whole, no run beside it.
+
+    It is read again where its file is damaged or other code has read the run.
+    """
+    if whole and not (folder / FILE_NAME).exists():
+        return None
+    with suppress(OSError, RunFileError):
+        try:
+            return read_outcome(folder / OUTCOME_NAME)
+        except ValueError:
+            return keep_outcome(open_run(folder))
+    return None
+
+
+@contextmanager
+def _draft_of(folder: Path) -> Iterator[Path]:
+    """Gives a folder that gets a run's name if the block ends well, unless another came first, and is gone else."""
+    draft = new_draft(folder)
+    try:
+        yield draft
+        try:
+            draft.rename(folder)
+        except OSError:
+            if stored_outcome(folder) is None:
+                # What is there is no whole run, as where only its numbers were kept.
+                folder.rename(aside := new_draft(folder))
+                draft.rename(folder)
+                shutil.rmtree(aside, ignore_errors=True)
+    finally:
+        shutil.rmtree(draft, ignore_errors=True)
+
+
+def new_draft(path: Path) -> Path:
+    """Returns a name for an attempt's own file or folder beside that which it is of."""
+    return path.with_name(f".{path.name}.{uuid.uuid4().hex[:8]}.part")

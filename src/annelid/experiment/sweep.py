@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import cached_property
+from importlib.metadata import version
 from itertools import product, zip_longest
 from math import prod
 from pathlib import Path
@@ -19,26 +21,23 @@ import numpy as np
 import xarray as xr
 from rich.table import Table
 
-import annelid
 from annelid.config import (
-    Cluster,
     RunConfig,
     Study,
     Vary,
     field_paths,
-    find_cluster,
     load_config,
     load_study,
     toml_value,
     unit_of,
 )
-from annelid.config.study import MOST_RUNS
+from annelid.config.study import INSTEAD, MOST_RUNS
 from annelid.draw.figures.sweep import sweep_figure, worded
-from annelid.errors import ConfigError
+from annelid.errors import ConfigError, shown
 from annelid.experiment.case import Case
 from annelid.experiment.check import MORE, Check, check_runs, percent, refinements
-from annelid.experiment.cluster import workers_of
 from annelid.experiment.numbers import NUMBERS, PREFERRED, Number, chosen_numbers
+from annelid.experiment.processes import workers
 from annelid.experiment.progress import StudyProgress
 from annelid.experiment.space import Choice, Variable, from_unit, sampled, unit_samples, variables_of
 from annelid.experiment.store import Done, Store
@@ -154,7 +153,7 @@ class Sweep:
                 "title": plan.study.name,
                 "study": plan.study.model_dump_json(by_alias=True),
                 "base_config": plan.base.model_dump_json(),
-                "annelid_version": annelid.__version__,
+                "annelid_version": version("annelid"),
                 "n_failed": sum(run.status == "failed" for run in self.runs),
                 "n_warned": sum(bool(run.warnings) for run in self.runs),
             },
@@ -187,10 +186,11 @@ def sweep(
     study: Study | str | Path | Mapping[str, Any],
     folder: str | Path = "sweep",
     *,
-    cluster: Cluster | str | None = None,
+    executor: Executor | None = None,
     jobs: int | None = None,
     check: int = 0,
     progress: StudyProgress | None = None,
+    cluster: object = None,
 ) -> xr.Dataset:
     """Computes a sweep, writes its results, and returns them.
 
@@ -199,11 +199,11 @@ def sweep(
     Args:
         study: The study, the path of its TOML file, or a nested mapping.
         folder: Folder for ``sweep.nc``, ``sweep.csv``, a figure, and the runs, which a second call finds there.
-        cluster: Where runs are computed: a section, or a word as `find_cluster` takes; default: processes of this
-            machine. What a study says of it is not used, since a scheduler and a job run code: name its file here.
-        jobs: Workers, instead of as many as there are cores, or as the cluster says.
+        executor: Who computes the runs; None for processes of this machine.
+        jobs: How many processes, by default one a core.
         check: How many of the runs are repeated at half the step and with one more element a side.
         progress: Called at the start and after every run.
+        cluster: Replaced by ``executor``, and refused.
 
     Returns:
         Every number of summary and gait with ``units`` and ``long_name``: along the varied fields of a grid, or along
@@ -214,15 +214,14 @@ def sweep(
     Raises:
         ConfigError: The study is refused, or all of its runs are, or one to be checked has a step that is no multiple
             of twice the control step.
-        MissingDependency: Dask or dask-jobqueue is needed and not installed.
         ClusterError: The workers are lost for good; finished runs are kept.
         RunFileError: A file cannot be written.
         KeyboardInterrupt: Finished runs are kept, and the results if only the check was interrupted.
     """
-    to_use = f'pass cluster="{study}"' if isinstance(study, str | Path) else "pass it as cluster"
-    done = swept(
-        load_study(study), Path(folder), cluster=cluster, jobs=jobs, check=check, progress=progress, to_use=to_use
-    )
+    if cluster is not None:
+        raise ConfigError(f"cluster = {shown(cluster)}: clusters have no names any more: {INSTEAD}")
+    with workers(executor, jobs) as given:
+        done = swept(load_study(study), Path(folder), executor=given, check=check, progress=progress)
     write_results(done)
     return done.data
 
@@ -231,43 +230,32 @@ def swept(
     study: Study,
     folder: Path,
     *,
-    cluster: Cluster | str | None = None,
-    jobs: int | None = None,
+    executor: Executor | None = None,
     check: int = 0,
     progress: StudyProgress | None = None,
-    to_use: str = "pass it as cluster",
 ) -> Sweep:
     """Computes a sweep as `sweep` does, in a folder that the caller has locked.
 
-    Writes nothing but the runs and, before a check begins, the results as they are without it. ``to_use`` is what the
-    user has to do to have the cluster used that the study describes, for a sentence.
+    Writes nothing but the runs and, before a check begins, the results as they are without it.
     """
     numbers = chosen_numbers(study.outputs, study.rank)
-    if cluster is None and study.cluster is not None:
-        warnings.warn(
-            f"the study {study.name!r} describes a cluster ({study.cluster}): not used; {to_use} to use it",
-            stacklevel=2,
-        )
-    to_join = find_cluster(cluster or "processes") if isinstance(cluster, str | None) else cluster
-    its_workers = workers_of(to_join, jobs)
     plan = plan_of(study)
     cases = [case for _, case in plan.points]
     refusals = [_refusal(case) if check else None for case in cases]
     for i in to_check(plan, check, [True] * len(cases)):
         if (refusal := refusals[i]) is not None:
             raise refusal
-    with its_workers as workers:
-        store = Store(folder / RUNS, workers, study.keep, progress)
-        done = store.finish(cases, "sweep")
-        if all(one.refused for one in done) and done[0].error is not None:
-            raise done[0].error
-        found = Sweep(plan, numbers, tuple(done), folder, {})
-        if check:
-            # Whoever interrupts the check keeps the sweep.
-            write_results(found)
-            usable = [one.status == "complete" and no is None for one, no in zip(done, refusals, strict=True)]
-            chosen = to_check(plan, check, usable)
-            found = replace(found, checks=dict(zip(chosen, check_runs(store, [cases[i] for i in chosen]), strict=True)))
+    store = Store(folder / RUNS, executor, study.keep, progress)
+    done = store.finish(cases, "sweep")
+    if all(one.refused for one in done) and done[0].error is not None:
+        raise done[0].error
+    found = Sweep(plan, numbers, tuple(done), folder, {})
+    if check:
+        # Whoever interrupts the check keeps the sweep.
+        write_results(found)
+        usable = [one.status == "complete" and no is None for one, no in zip(done, refusals, strict=True)]
+        chosen = to_check(plan, check, usable)
+        found = replace(found, checks=dict(zip(chosen, check_runs(store, [cases[i] for i in chosen]), strict=True)))
     return found
 
 

@@ -23,7 +23,6 @@ from annelid.errors import ConfigError, suggest
 from annelid.experiment.case import Case, write_worm
 from annelid.experiment.optimisers import optimiser_of
 from annelid.experiment.outcome import Outcome
-from annelid.experiment.progress import in_stage
 from annelid.experiment.space import Choice, Variable, variables_of
 from annelid.experiment.store import Done, Store, case_key
 from annelid.output import write_csv
@@ -245,7 +244,7 @@ def search(task: Task, store: Store) -> Iterator[list[Trial]]:
     inside = all(own[one.field] in one for one in task.variables)
     optimiser = optimiser_of(task.variables, len(task.objectives), own if inside else None, task.seed)
     generation = next(optimiser)
-    outcomes = store.compute([start], progress=in_stage(report, "the gait it starts from"))
+    outcomes = store.compute([start], "the gait it starts from", progress=report)
     found.append(_trial(START, {}, start, Done(outcomes[case_key(start)]), task.numerics))
     yield list(found)
     while (done := len(found) - 1) < task.n_trials:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import asdict, dataclass
 from math import floor, log10, sqrt
 from pathlib import Path
@@ -25,9 +26,10 @@ from annelid.draw.table import framed_table
 from annelid.errors import ConfigError, SimulationStopped
 from annelid.experiment.case import Case
 from annelid.experiment.check import ELEMENTS, STEP, finer_steps, go_on_in, more_elements
+from annelid.experiment.processes import workers
+from annelid.experiment.progress import StudyProgress
 from annelid.experiment.spread import UNMEASURED, Spread, applicable, changes, draw, read_spread, scaled_fields
-from annelid.experiment.store import Progress, Store, case_key
-from annelid.experiment.workers import Processes
+from annelid.experiment.store import Store, case_key
 from annelid.output import whole_file, write_csv, write_json
 from annelid.simulation.lock import locks
 from annelid.simulation.runfile import FILE_NAME
@@ -227,9 +229,10 @@ def uncertainty(
     folder: str | Path,
     *,
     spread: Spread | None = None,
+    executor: Executor | None = None,
     jobs: int | None = None,
     overwrite: bool = False,
-    progress: Progress | None = None,
+    progress: StudyProgress | None = None,
 ) -> Uncertainty:
     """Runs a worm and its variants, as far as the folder does not have them, and gives its numbers error bars.
 
@@ -238,7 +241,8 @@ def uncertainty(
         n: How many Monte Carlo samples are drawn, at least 2; others are drawn for another n.
         folder: Folder of the run, ``run.nc``; all runs are kept in ``uncertainty`` below it.
         spread: Errors of the parameters; by default those of annelid's own fit (`read_spread`).
-        jobs: Processes, by default as many as there are cores.
+        executor: Who computes the runs; None for processes of this machine.
+        jobs: How many processes, by default one a core.
         overwrite: Allow a folder that has something else in it, and replace its ``run.nc``.
         progress: Called at the start and after every run.
 
@@ -259,8 +263,8 @@ def uncertainty(
         (kind, Case(config.name, changed, config)) for kind, changed in plan(config, n, chosen)
     ]
     go_on_in(folder, RUNS, config, overwrite=overwrite)
-    with Processes(jobs) as workers:
-        outcomes = Store(folder / RUNS, workers).compute([case for _, case in variants], progress=progress)
+    with workers(executor, jobs) as given:
+        outcomes = Store(folder / RUNS, given, progress=progress).compute([case for _, case in variants], "error bars")
     found = [outcomes[case_key(case)] for _, case in variants]
     done = tuple(
         VariantRun(kind, case.changes, of.path, of.rhythm.verdict, of.rhythm.reason, of.message, readings(of.summary))

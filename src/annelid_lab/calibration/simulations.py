@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 from collections.abc import Sequence
-from contextlib import nullcontext
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,7 +13,7 @@ import numpy as np
 
 from annelid.config import RunConfig
 from annelid.errors import ClusterError
-from annelid.experiment import StudyProgress, Workers, code_fingerprint, physics_fingerprint
+from annelid.experiment import StudyProgress, answers, physics_fingerprint, room_of
 from annelid.output import whole_file
 from annelid_lab.calibration.base import Found, Test
 
@@ -39,8 +39,7 @@ class Simulation:
     @property
     def name(self) -> str:
         """Names its file: the test, the worm, and the code that computes them."""
-        code = physics_fingerprint() + code_fingerprint(type(self.test).__module__)
-        text = f"{self.test!r}{self.config}{code}"
+        text = f"{self.test!r}{self.config}{physics_fingerprint(room_of(type(self.test)))}"
         return f"{type(self.test).__name__}-{hashlib.sha256(text.encode()).hexdigest()[:16]}.npz"
 
 
@@ -48,16 +47,16 @@ class Simulations:
     """A folder of what tests of worms gave."""
 
     def __init__(
-        self, folder: Path | None = None, workers: Workers | None = None, progress: StudyProgress | None = None
+        self, folder: Path | None = None, executor: Executor | None = None, progress: StudyProgress | None = None
     ) -> None:
         """Opens it.
 
         Args:
             folder: Where they are kept; None for in memory only.
-            workers: Who computes; None for this process.
+            executor: Who computes; None for this process.
             progress: Called with the stage as tests go on.
         """
-        self._folder, self._workers, self._progress = folder, workers, progress
+        self._folder, self._executor, self._progress = folder, executor, progress
         self._known: dict[str, Found] = {}
         self.computed = 0
         """How many tests were computed, and not found."""
@@ -76,23 +75,16 @@ class Simulations:
         names = [task.name for task in tasks]
         missing = {name: task for name, task in zip(names, tasks, strict=True) if not self._find(name)}
         left = list(missing.items())
-
-        def take(number: int, content: bytes | None) -> None:
+        if left:
+            self._report(stage, 0, len(left))
+        calls = ((task,) for _, task in left)
+        given = enumerate(task for _, task in left) if self._executor is None else answers(self._executor, calls)
+        for done, (number, answer) in enumerate(given, start=1):
+            content = answer()
             if not isinstance(content, bytes) or len(content) > MOST_BYTES:
                 raise ClusterError("a worker sent no arrays, or too many")
             self._keep(left[number][0], content)
-
-        if self._workers is None:
-            for number, (_, task) in enumerate(left):
-                self._report(stage, number, len(left))
-                take(number, task())
-        elif left:
-            with nullcontext(self._workers) as workers:
-                self._report(stage, 0, len(left))
-                for done, (_, error) in enumerate(workers.computed(len(left), lambda i: left[i][1], take), start=1):
-                    if error is not None:
-                        raise error
-                    self._report(stage, done, len(left))
+            self._report(stage, done, len(left))
         self.computed += len(left)
         return [self._known[name] for name in names]
 

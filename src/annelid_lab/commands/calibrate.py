@@ -9,11 +9,11 @@ import typer
 
 from annelid.cli import (
     Assignments,
-    ClusterName,
     Force,
     Jobs,
     Output,
     Quiet,
+    SchedulerAddress,
     command,
     complain,
     kept_runs,
@@ -40,7 +40,7 @@ def calibrate_command(
         typer.Option(metavar="PARAMETER", help="Fit only these; may be repeated.  [default: those of the study]"),
     ] = None,
     jobs: Jobs = None,
-    cluster: ClusterName = None,
+    scheduler: SchedulerAddress = None,
     example: Annotated[bool, typer.Option("--example", help="Print the study of the robot, to begin with.")] = False,
     quiet: Quiet = False,
     force: Force = False,
@@ -77,9 +77,9 @@ def calibrate_command(
     source = ROBOT if study is None else study
     loaded = load_identify_study(source).but(overrides_of(assignments))
     loaded = loaded.only(free) if free else loaded
-    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+    with kept_runs(output, jobs=jobs, scheduler=scheduler, quiet=quiet) as store:
         refuse_existing(output / REPORT, force)
-        simulations = Simulations(store.folder, store.workers, store.progress)
+        simulations = Simulations(store.folder, store.executor, store.progress)
         found = identify(loaded, source.parent, simulations, lambda note: complain(f"note: {note}"))
     for sentence in found.intervals.confused:
         complain(f"note: {sentence}")

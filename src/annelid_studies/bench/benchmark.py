@@ -310,7 +310,7 @@ class Measurements:
         return measured
 
     def _path(self, case: BenchCase) -> Path:
-        code = case_key(case.case) + code_fingerprint(MEASURING)
+        code = case_key(case.case) + code_fingerprint("annelid.analysis", MEASURING)
         stem = case.name.replace(", ", "-").replace(" ", "-")
         return self.folder / f"{stem}-{hashlib.sha256(code.encode()).hexdigest()[:12]}.json"
 

@@ -11,7 +11,6 @@ import typer
 from annelid.cli import (
     RIGID_PRESET,
     Assignments,
-    ClusterName,
     FidelityLevel,
     Force,
     Jobs,
@@ -19,6 +18,7 @@ from annelid.cli import (
     Output,
     Quiet,
     ResultsFolder,
+    SchedulerAddress,
     config_of,
     kept_runs,
     lock,
@@ -40,7 +40,7 @@ def speed_command(
     output: Output = Path("speed"),
     quick: Annotated[bool, typer.Option("--quick", help="Two values of each quantity.")] = False,
     jobs: Jobs = None,
-    cluster: ClusterName = None,
+    scheduler: SchedulerAddress = None,
     quiet: Quiet = False,
 ) -> None:
     """Find out how fast gaits crawl over friction and number of segments.
@@ -58,7 +58,7 @@ def speed_command(
     """
     from annelid_studies import crawling
 
-    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+    with kept_runs(output, jobs=jobs, scheduler=scheduler, quiet=quiet) as store:
         readings = crawling.crawl(store, gaits or crawling.GAITS, "quick" if quick else "full")
     path = crawling.write_readings(readings, output / "speed.csv")
     tables = (crawling.crawling_table(readings, quantity) for quantity in crawling.VALUES)
@@ -74,7 +74,7 @@ def gaits_command(
     output: Output = Path("gaits"),
     quick: Annotated[bool, typer.Option("--quick", help="Two perturbed runs, and half the step only.")] = False,
     jobs: Jobs = None,
-    cluster: ClusterName = None,
+    scheduler: SchedulerAddress = None,
     quiet: Quiet = False,
 ) -> None:
     """Measure gaits with error bars: is a speed an accident of its run, or of the resolution?
@@ -95,7 +95,7 @@ def gaits_command(
 
     found: list[crawling.Headline] = []
     path = output / "gaits.csv"
-    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+    with kept_runs(output, jobs=jobs, scheduler=scheduler, quiet=quiet) as store:
         for one in crawling.headlines(store, gaits or crawling.HEADLINES, "quick" if quick else "full"):
             found.append(one)
             crawling.write_headlines(found, path)
@@ -108,7 +108,7 @@ def slip_command(
     quick: Annotated[bool, typer.Option("--quick", help="Two frictions and two draws only.")] = False,
     half_step: Annotated[bool, typer.Option("--half-step", help="Bodies move in steps half as long.")] = False,
     jobs: Jobs = None,
-    cluster: ClusterName = None,
+    scheduler: SchedulerAddress = None,
     quiet: Quiet = False,
 ) -> None:
     """Measure what pressure feedback saves of the work lost to friction, against a wave by the clock.
@@ -125,7 +125,7 @@ def slip_command(
     """
     from annelid_studies import slip
 
-    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+    with kept_runs(output, jobs=jobs, scheduler=scheduler, quiet=quiet) as store:
         readings = slip.slip_feedback(store, "quick" if quick else "full", half_step=half_step)
     path = slip.write_readings(readings, output / "slip.csv")
     written = path, slip.feedback_figure(readings, path.with_suffix(""))
@@ -137,7 +137,7 @@ def slip_detector_command(
     output: Output = SLIP,
     quick: Annotated[bool, typer.Option("--quick", help="Two runs only.")] = False,
     jobs: Jobs = None,
-    cluster: ClusterName = None,
+    scheduler: SchedulerAddress = None,
     quiet: Quiet = False,
 ) -> None:
     """Judge the slip detector, which knows stretch and pressure only, by the slip that the simulator knows of.
@@ -153,7 +153,7 @@ def slip_detector_command(
     """
     from annelid_studies import slip
 
-    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+    with kept_runs(output, jobs=jobs, scheduler=scheduler, quiet=quiet) as store:
         found = slip.slip_detection(store, slip.QUICK_CASES if quick else tuple(slip.CASES))
     scores = slip.scores(found)
     path = slip.write_scores(scores, output / "slip_detector.csv")
@@ -166,7 +166,7 @@ def turning_command(
     output: Output = Path("turning"),
     quick: Annotated[bool, typer.Option("--quick", help="The strongest modulation to either side only.")] = False,
     jobs: Jobs = None,
-    cluster: ClusterName = None,
+    scheduler: SchedulerAddress = None,
     quiet: Quiet = False,
 ) -> None:
     """Find out on which radius the worm turns.
@@ -185,7 +185,7 @@ def turning_command(
     from annelid_studies.tables import write_fields
     from annelid_studies.turning import MODULATIONS, QUICK, Reading, turning, turning_picture, turning_table
 
-    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+    with kept_runs(output, jobs=jobs, scheduler=scheduler, quiet=quiet) as store:
         readings, tracks = turning(store, QUICK if quick else MODULATIONS)
     path = write_fields(Reading, readings, output / "turning.csv")
     written = path, turning_picture(readings, tracks, path.with_suffix(""))
@@ -197,7 +197,7 @@ def pipes_command(
     output: Output = Path("pipes"),
     quick: Annotated[bool, typer.Option("--quick", help="The taper with two gaits, and one bend.")] = False,
     jobs: Jobs = None,
-    cluster: ClusterName = None,
+    scheduler: SchedulerAddress = None,
     quiet: Quiet = False,
 ) -> None:
     """Find out which pipes the worm passes, and how fast.
@@ -218,7 +218,7 @@ def pipes_command(
     from annelid_studies.pipes import Reading, pass_pipes, pipes_picture, pipes_table, trials
     from annelid_studies.tables import write_fields
 
-    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+    with kept_runs(output, jobs=jobs, scheduler=scheduler, quiet=quiet) as store:
         readings, courses = pass_pipes(store, trials(quick))
     path = write_fields(Reading, readings, output / "pipes.csv")
     written = path, pipes_picture(readings, courses, path.with_suffix(""))
@@ -230,7 +230,7 @@ def riddle2025_command(
     output: Output = Path("riddle2025"),
     quick: Annotated[bool, typer.Option("--quick", help="One friction, and one bend.")] = False,
     jobs: Jobs = None,
-    cluster: ClusterName = None,
+    scheduler: SchedulerAddress = None,
     quiet: Quiet = False,
 ) -> None:
     """Compare the six-segment robot with its authors' model, on their axes.
@@ -249,7 +249,7 @@ def riddle2025_command(
     from annelid_studies.riddle2025 import Reading, compare, comparison_picture, comparison_table, points
     from annelid_studies.tables import write_fields
 
-    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+    with kept_runs(output, jobs=jobs, scheduler=scheduler, quiet=quiet) as store:
         readings = compare(store, points(quick))
     path = write_fields(Reading, readings, output / "riddle2025.csv")
     print_results((path, comparison_picture(readings, path.with_suffix(""))), comparison_table(readings), quiet=quiet)
@@ -287,7 +287,7 @@ def load_frame_command(
     annelid study load-frame --set body.strands.young_modulus_Pa=1e9 --set body.joints.dry_friction_Nm=0.01
     """
     from annelid.experiment import study_progress
-    from annelid_lab import load_frame as frame
+    from annelid_lab.calibration import load_frame as frame
 
     table = output / "load_frame.csv"
     lock(output)
@@ -312,7 +312,7 @@ def weak_middle_command(
     output: Output = Path("weak-middle"),
     quick: Annotated[bool, typer.Option("--quick", help="Worms of 3 and 4 segments and two values a sweep.")] = False,
     jobs: Jobs = None,
-    cluster: ClusterName = None,
+    scheduler: SchedulerAddress = None,
     quiet: Quiet = False,
 ) -> None:
     """Find out why the middle of the worm elongates less than its ends.
@@ -335,7 +335,7 @@ def weak_middle_command(
     from annelid_studies.weak_middle.sweeps import BASE_KEY, QUANTITIES, asymmetry, weak_middle
 
     found = None
-    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+    with kept_runs(output, jobs=jobs, scheduler=scheduler, quiet=quiet) as store:
         set_to, readings = weak_middle(store, "quick" if quick else "full")
         if not quick:
             found = asymmetry(store, set_to[BASE_KEY].force_N)

@@ -106,7 +106,7 @@ def gallery_command(
         name for name, one in known.items() if one.maker != "by-hand" and (every or one.minutes <= QUICK_MINUTES)
     ]
     output.mkdir(parents=True, exist_ok=True)
-    with kept_runs(kept, jobs=jobs, cluster=None, quiet=quiet) as store:
+    with kept_runs(kept, jobs=jobs, quiet=quiet) as store:
         store.compute([case for name in chosen for case in cases(known[name]).values()], "gallery")
         for name in chosen:
             one = known[name]

@@ -11,12 +11,12 @@ import typer
 
 from annelid.cli import (
     EXIT_SOME_FAILED,
-    ClusterName,
     Jobs,
     OnlyPaths,
     Output,
     Quiet,
     ResultsFolder,
+    SchedulerAddress,
     command,
     complain,
     end_study,
@@ -40,7 +40,7 @@ def paper_command(
         typer.Option(metavar="NAME", help="Only this examination, and the main numbers; may be repeated."),
     ] = None,
     jobs: Jobs = None,
-    cluster: ClusterName = None,
+    scheduler: SchedulerAddress = None,
     claims: Annotated[
         Path | None, typer.Option(metavar="FILE.md", help="Write the table of claims there as well, as Markdown.")
     ] = None,
@@ -68,9 +68,9 @@ def paper_command(
         claims = with_suffix(claims, (".md",), "Markdown", default=".md")
         if not claims.parent.is_dir():
             raise RunFileError(f"{claims} cannot be written: there is no folder {claims.parent}")
-    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+    with kept_runs(output, jobs=jobs, scheduler=scheduler, quiet=quiet) as store:
         effort = "quick" if quick else "full"
-        report = reproduce(output, effort, only=only or None, workers=store.workers, progress=store.progress)
+        report = reproduce(output, effort, only=only or None, executor=store.executor, progress=store.progress)
         html = write_report(report, output)
     written = [html, html.with_suffix(".md")]
     if claims is not None:
@@ -160,7 +160,7 @@ def robustness_command(
         bool, typer.Option("--keep", help="Keep what robustness.json says of points run by other versions of the code.")
     ] = False,
     jobs: Jobs = None,
-    cluster: ClusterName = None,
+    scheduler: SchedulerAddress = None,
     quiet: OnlyPaths = False,
 ) -> None:
     """Compare how often controllers make different worms walk.
@@ -179,14 +179,14 @@ def robustness_command(
     """
     from annelid_studies.robustness import CONTROLLERS, robustness, shares, shares_table
 
-    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+    with kept_runs(output, jobs=jobs, scheduler=scheduler, quiet=quiet) as store:
         judged = robustness(
             output,
             points,
             controllers=tuple(controller or CONTROLLERS),
             n_segments=segments,
             keep=keep,
-            workers=store.workers,
+            executor=store.executor,
             progress=store.progress,
         )
     if not (quiet or wants_json()):
@@ -231,7 +231,7 @@ def challenge_command(
     ] = None,
     output: Output = Path("challenge"),
     jobs: Jobs = None,
-    cluster: ClusterName = None,
+    scheduler: SchedulerAddress = None,
     quiet: Quiet = False,
 ) -> None:
     """Rank controllers in a benchmark of crawling.
@@ -263,7 +263,7 @@ def challenge_command(
     duration_s = tasks.QUICK_DURATION_S if quick else None
     found = tasks.find_entrants(entrants or [])
     wanted = tasks.entries(found, task or [], seeds, finer=finer, duration_s=duration_s)
-    with kept_runs(output, jobs=jobs, cluster=cluster, quiet=quiet) as store:
+    with kept_runs(output, jobs=jobs, scheduler=scheduler, quiet=quiet) as store:
         scores = challenge(store, wanted, earlier)
     ranked = standings(scores)
     taus = [agreement(mean_speeds(scores), other) for other in others]

@@ -6,6 +6,7 @@ import hashlib
 import json
 import platform
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
@@ -15,7 +16,7 @@ from annelid.analysis import PAPER_ELONGATION_M, PAPER_END_DIFFERENCE, PAPER_MID
 from annelid.body import WormBody
 from annelid.draw import figure7, network_figure
 from annelid.errors import ConfigError, suggest
-from annelid.experiment import Case, Outcome, Store, StudyProgress, Workers, code_fingerprint
+from annelid.experiment import Case, Outcome, Store, StudyProgress, code_fingerprint
 from annelid.markdown import Table
 from annelid.nervous import PeristalsisParameters, peristalsis_network
 from annelid.output import write_text
@@ -52,7 +53,7 @@ def reproduce(
     effort: Effort = "full",
     *,
     only: Sequence[str] | None = None,
-    workers: Workers | None = None,
+    executor: Executor | None = None,
     progress: StudyProgress | None = None,
 ) -> Report:
     """Reruns everything the paper shows or claims, as far as it has not been run into the folder before.
@@ -62,7 +63,7 @@ def reproduce(
         effort: ``"quick"`` for coarser maps and fewer runs, ``"full"`` for all.
         only: Names of the examinations wanted, with the main numbers but without figures and claims; None for the
             whole.
-        workers: Who computes the runs; default: a process for each core.
+        executor: Who computes the runs; None for a process of this machine on every core.
         progress: Called as the work goes on.
 
     Returns:
@@ -80,7 +81,7 @@ def reproduce(
     cases = [*variants.values(), *(case for examination in chosen for case in examination.cases(effort))]
     if only is None:
         cases += claim_cases(effort)
-    store = Store(folder / "runs", workers, progress=progress)
+    store = Store(folder / "runs", executor, progress=progress)
     outcomes = store.compute(cases, "running worms")
     pictures = folder / "figures"
     pictures.mkdir(parents=True, exist_ok=True)
@@ -141,7 +142,7 @@ def kept(stem: Path, made_of: Sequence[object], make: Callable[[], dict[str, Any
         made_of: All that the picture depends on beside annelid's code, of plain numbers, words and lists.
         make: Draws the picture and returns what goes with it, ready for JSON.
     """
-    mark = hashlib.sha256(json.dumps([code_fingerprint(), *made_of]).encode()).hexdigest()
+    mark = hashlib.sha256(json.dumps([code_fingerprint("annelid", "annelid_studies"), *made_of]).encode()).hexdigest()
     note, *pictures = (stem.with_name(f"{stem.name}{suffix}") for suffix in (".json", ".svg", ".png"))
     try:
         content = read_json(note)

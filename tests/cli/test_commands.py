@@ -3,6 +3,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -239,12 +240,24 @@ def test_every_option_with_a_unit_says_it() -> None:
         assert unit.search(option.help), option.opts
 
 
-def test_the_shell_completes_options() -> None:
-    typed, offers = "annelid run --fid", "--fidelity"
-    asked = {"COMP_WORDS": typed, "COMP_CWORD": str(typed.count(" ")), "_ANNELID_COMPLETE": "complete_bash"}
-    name = Path(sys.executable).with_name("annelid")
-    done = subprocess.run([name], env={**os.environ, **asked}, capture_output=True, text=True, check=False)
-    assert offers in done.stdout.split()
+def test_the_shell_completes_options_presets_arenas_and_runs(tmp_path: Path, finished: Path) -> None:
+    shutil.copytree(finished, tmp_path / "runs" / "mine-001")
+    for typed, offers in (
+        ("annelid run --fid", "--fidelity"),
+        ("annelid run riddle2022", "riddle2022-planar"),
+        ("annelid run --arena pipe.b", "pipe.bend"),
+        ("annelid show runs/m", "runs/mine-001"),
+    ):
+        asked = {"COMP_WORDS": typed, "COMP_CWORD": str(typed.count(" ")), "_ANNELID_COMPLETE": "complete_bash"}
+        done = subprocess.run(
+            [sys.executable, "-m", "annelid"],
+            env={**os.environ, **asked},
+            capture_output=True,
+            text=True,
+            check=False,
+            cwd=tmp_path,
+        )
+        assert offers in done.stdout.split(), done.stderr
 
 
 def test_help_and_version_come_from_the_module_as_well() -> None:

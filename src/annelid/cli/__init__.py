@@ -30,6 +30,7 @@ from annelid.cli.common import (
     print_results,
     print_run,
     refuse_existing,
+    runs_from,
 )
 from annelid.cli.entry import (
     EXIT_ALL_FAILED,
@@ -89,6 +90,7 @@ __all__ = [
     "print_run",
     "refuse_existing",
     "refuse_json",
+    "runs_from",
     "study",
     "typed_command",
     "wants_json",

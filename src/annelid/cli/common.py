@@ -26,6 +26,34 @@ if TYPE_CHECKING:
 
 FIRST_PRESET, RIGID_PRESET = "riddle2023-fast", "riddle2023-rods"
 """What runs where no preset is named: the paper's worm with its soft crossings, or the one with rigid crossings."""
+
+
+def presets_from(typed: str) -> list[str]:
+    """Completes the name of a preset, for the shell."""
+    from annelid.config import preset_names
+
+    return [name for name in preset_names() if name.startswith(typed)]
+
+
+def arenas_from(typed: str) -> list[str]:
+    """Completes the name of an arena, for the shell."""
+    from annelid.config import arena_names
+
+    return [name for name in arena_names() if name.startswith(typed)]
+
+
+def runs_from(typed: str) -> list[str]:
+    """Completes the folder of a run, for the shell: of those in ``runs`` and beside what was typed."""
+    beside = Path(typed) if typed.endswith("/") else Path(typed).parent
+    found = {str(path.parent) for folder in (Path("runs"), beside) for path in folder.glob("*/run.nc")}
+    return sorted(path for path in found if path.startswith(typed))
+
+
+def worms_from(typed: str) -> list[str]:
+    """Completes a preset or the folder of a run, for the shell."""
+    return presets_from(typed) + runs_from(typed)
+
+
 WORM = "Name of a preset, a TOML file, or a robot as MJCF (.xml)."
 
 Preset = Annotated[
@@ -33,9 +61,10 @@ Preset = Annotated[
     typer.Argument(
         help=f"{WORM}  [default: {FIRST_PRESET}; with --segments, --fidelity or --uncertainty {RIGID_PRESET}]",
         metavar="[PRESET|FILE.toml]",
+        autocompletion=presets_from,
     ),
 ]
-NamedPreset = Annotated[str, typer.Argument(help=WORM, metavar="[PRESET|FILE.toml]")]
+NamedPreset = Annotated[str, typer.Argument(help=WORM, metavar="[PRESET|FILE.toml]", autocompletion=presets_from)]
 Assignments = Annotated[
     list[str] | None,
     typer.Option(
@@ -59,6 +88,7 @@ ArenaName = Annotated[
     typer.Option(
         "--arena",
         metavar="ARENA|FILE.toml|FILE.xml",
+        autocompletion=arenas_from,
         help="Put the 3D worm elsewhere: a name of `annelid list arenas`, a TOML file, or a scene of your own as MJCF"
         " [default: where the preset is]",
     ),
@@ -78,7 +108,9 @@ Output = Annotated[Path, typer.Option("--output", "-o", help="Folder of the resu
 ResultsFolder = Annotated[Path, typer.Option("--output", "-o", help="Folder of the results.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no tables, only the paths.")]
 OnlyPaths = Annotated[bool, typer.Option("--quiet", "-q", help="No progress, only the paths.")]
-RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="A run's folder, or its run.nc.")]
+RunPath = Annotated[
+    Path, typer.Argument(metavar="RUN", help="A run's folder, or its run.nc.", autocompletion=runs_from)
+]
 Force = Annotated[bool, typer.Option("--force", help="Replace an output file that exists.")]
 
 

@@ -22,6 +22,7 @@ from annelid.cli.common import (
     print_paths,
     print_run,
     refuse_existing,
+    worms_from,
 )
 from annelid.cli.entry import command, lock
 from annelid.cli.result import give, refuse_json, wants_json
@@ -147,7 +148,11 @@ def draw_command(
 def view_command(
     source: Annotated[
         str | None,
-        typer.Argument(metavar="[PRESET|FILE.toml|RUN]", help="A worm to run, or a run's folder or run.nc to play."),
+        typer.Argument(
+            metavar="[PRESET|FILE.toml|RUN]",
+            help="A worm to run, or a run's folder or run.nc to play.",
+            autocompletion=worms_from,
+        ),
     ] = None,
     assignments: Assignments = None,
     segments: Segments = None,
@@ -218,7 +223,12 @@ def view_command(
 @command("export", "Exchange")
 def export_command(
     source: Annotated[
-        str, typer.Argument(metavar="RUN|PRESET|FILE.toml", help="A run's folder or run.nc; for mjcf also a worm.")
+        str,
+        typer.Argument(
+            metavar="RUN|PRESET|FILE.toml",
+            help="A run's folder or run.nc; for mjcf also a worm.",
+            autocompletion=worms_from,
+        ),
     ],
     to: Annotated[str, typer.Option(metavar="FORMAT", help="csv, mat, parquet, nwb, mp4, gif, html or mjcf.")],
     output: Annotated[
@@ -315,7 +325,9 @@ def cite_command(
     source: Annotated[
         str | None,
         typer.Argument(
-            metavar="[RUN|PRESET|FILE.toml]", help="What was used  [default: only annelid and the paper behind it]"
+            metavar="[RUN|PRESET|FILE.toml]",
+            help="What was used  [default: only annelid and the paper behind it]",
+            autocompletion=worms_from,
         ),
     ] = None,
     everything: Annotated[bool, typer.Option("--all", help="Print every entry that annelid knows.")] = False,

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from annelid.cli import Force, command, complain, give, lock, play, print_paths, refuse_existing
+from annelid.cli import Force, command, complain, give, lock, play, print_paths, refuse_existing, runs_from
 from annelid.errors import RunFileError
 
 
@@ -17,6 +17,7 @@ def compare_command(
         list[Path],
         typer.Argument(
             metavar="RUN RUN..",
+            autocompletion=runs_from,
             help="Folders of runs, or their run.nc; differences are to the first. With --map: a run and a table.",
         ),
     ],

@@ -65,7 +65,6 @@ MAY_IMPORT = {
 }
 SECTIONS = ("body", "arena", "controller", "turning", "rings", "formulation")
 NUMPY_ONLY = {"morphology", "nervous", "protocols"}
-OPTIONAL = {"nervous/toolbox.py": {"sns_toolbox"}}
 
 
 def room_of(module: Path) -> str:
@@ -112,8 +111,7 @@ def test_nervous_system_and_geometry_know_numpy_only() -> None:
     for module in MODULES:
         if room_of(module) in NUMPY_ONLY:
             packages = {name.split(".")[0] for name in imported(module)} - set(sys.stdlib_module_names)
-            allowed = {"annelid", "numpy"} | OPTIONAL.get(module.relative_to(SOURCE).as_posix(), set())
-            wrong += [f"{module.name}: {package}" for package in packages - allowed]
+            wrong += [f"{module.name}: {package}" for package in packages - {"annelid", "numpy"}]
     assert not wrong
 
 

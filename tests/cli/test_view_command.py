@@ -51,7 +51,6 @@ def test_a_page_is_not_overwritten_and_goes_without_a_window(tmp_path: Path) -> 
     assert "name another file with --export, or replace it with --force" in refusal("--export", str(page))
     assert page.read_text() == "mine"
     assert "its name must end in .html" in refusal("--export", str(tmp_path / "walk.pdf"))
-    assert "does not go with --native" in refusal("--export", str(tmp_path / "other.html"), "--native")
 
 
 def test_a_worm_is_exported_as_one_page(tmp_path: Path) -> None:
@@ -62,14 +61,6 @@ def test_a_worm_is_exported_as_one_page(tmp_path: Path) -> None:
     text = page.read_text(encoding="utf-8")
     assert "__VISER_EMBED_DATA__" in text
     assert "<title>riddle2023-rods - annelid</title>" in text
-
-
-@pytest.mark.skipif(sys.platform == "darwin", reason="macOS has a display")
-def test_a_machine_without_a_display_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    import glfw
-
-    monkeypatch.setattr(glfw, "init", lambda: False)
-    assert "no window can be opened here" in refusal("--native")
 
 
 def test_without_viser_the_line_that_installs_it_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

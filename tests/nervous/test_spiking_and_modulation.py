@@ -8,15 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from annelid.errors import ConfigError
-from annelid.nervous import (
-    Firing,
-    ModulatorySynapse,
-    Network,
-    Neuron,
-    Scheme,
-    SpikingSynapse,
-    export_network,
-)
+from annelid.nervous import Firing, ModulatorySynapse, Network, Neuron, Scheme, SpikingSynapse
+from annelid_lab.sns_toolbox import export_network
 
 
 def lone(neuron: Neuron) -> Network:

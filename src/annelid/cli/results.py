@@ -163,9 +163,6 @@ def view_command(
         Path | None,
         typer.Option(metavar="FILE.html", help="Write one HTML page that opens from disk and plays, and show nothing."),
     ] = None,
-    native: Annotated[
-        bool, typer.Option("--native", help="In MuJoCo's own window instead of a browser; needs a display.")
-    ] = False,
     open_browser: Annotated[bool, typer.Option("--open/--no-open", help="Open the page in the browser.")] = True,
     host: Annotated[
         str, typer.Option(help="Address to listen on; 0.0.0.0 lets in other machines that know the token.")
@@ -189,7 +186,6 @@ def view_command(
     annelid view runs/riddle2023-rods-001                a run, as it was recorded
     annelid compare runs/riddle2023-rods-001 robot.csv --map robot.toml --view   with a robot's log beside it
     annelid view runs/riddle2023-rods-001 --export walk.html   as one page to send by mail
-    annelid view --native                                in MuJoCo's own window
     """
     worm: RunConfig | Run
     if source and not source.endswith(".toml") and Path(source).exists():
@@ -202,8 +198,6 @@ def view_command(
         preset = RIGID_PRESET if source is None else source
         worm = config_of(preset, overrides_of(assignments), segments, fidelity, arena)
     if export is not None:
-        if native:
-            raise typer.BadParameter("--export writes a page: it does not go with --native")
         from annelid.draw.gallery import task_bar
         from annelid.live.page import export_page, page_path
 
@@ -211,11 +205,6 @@ def view_command(
         refuse_existing(page, force, "--export")
         with task_bar("writing the page") as progress:
             typer.echo(export_page(worm, page, speed=speed, progress=progress))
-        return
-    if native:
-        from annelid.live.native import show_native
-
-        show_native(worm, speed=speed)
         return
     play(worm, host=host, port=port, speed=speed, open_browser=open_browser)
 

@@ -29,10 +29,7 @@ try:
     from websockets.datastructures import Headers
     from websockets.http11 import Request, Response
 except ImportError:
-    raise MissingDependency(
-        "the live view needs viser: install it with  pip install 'annelid[view]'  or look at a worm without a browser "
-        "with annelid view --native"
-    ) from None
+    raise MissingDependency("the live view needs viser: install it with  pip install 'annelid[view]'") from None
 
 LOOPBACK = "127.0.0.1"
 ANY_ADDRESS = ("", "0.0.0.0", "::")

@@ -47,7 +47,6 @@ from annelid.nervous.peristalsis import (
 )
 from annelid.nervous.stepper import Factors, GateStart, NetworkState, Scheme, Stepper
 from annelid.nervous.toml import network_of_tables, network_tables
-from annelid.nervous.toolbox import export_network, import_network
 from annelid.nervous.wiring import Connection
 
 __all__ = [
@@ -83,11 +82,9 @@ __all__ = [
     "differentiation",
     "division",
     "drive_conductance_uS",
-    "export_network",
     "find_period",
     "half_centre_network",
     "half_centre_of_period",
-    "import_network",
     "integration",
     "multiplication",
     "network_of_tables",

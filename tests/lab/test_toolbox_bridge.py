@@ -8,18 +8,8 @@ import numpy as np
 import pytest
 
 from annelid.errors import ConfigError, MissingDependency
-from annelid.nervous import (
-    Channel,
-    GapJunction,
-    Gate,
-    Network,
-    Neuron,
-    Synapse,
-    export_network,
-    import_network,
-    peristalsis_network,
-    persistent_sodium,
-)
+from annelid.nervous import Channel, GapJunction, Gate, Network, Neuron, Synapse, peristalsis_network, persistent_sodium
+from annelid_lab.sns_toolbox import export_network, import_network
 
 connections: Any = None
 networks: Any = None

@@ -17,8 +17,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import numpy as np
 
 from annelid.errors import ConfigError, MissingDependency, suggest
-from annelid.nervous.network import Network
-from annelid.nervous.neurons import Channel, GapJunction, Gate, Neuron, Synapse
+from annelid.nervous import Channel, GapJunction, Gate, Network, Neuron, Synapse
 from annelid.text import numbered
 
 if TYPE_CHECKING:

@@ -21,7 +21,6 @@ import numpy as np
 
 import annelid
 from annelid.control.base import SENSED
-from annelid.export import Firmware, HostFirmware, controller_firmware, network_firmware
 from annelid.nervous import (
     Channel,
     Firing,
@@ -37,6 +36,7 @@ from annelid.nervous import (
 )
 from annelid.output import write_csv
 from annelid.protocols import Controller, Sensation
+from annelid_lab.firmware import Firmware, HostFirmware, controller_firmware, network_firmware
 from annelid_studies.worms import PAPERS_RODS
 
 ARM = Path(__file__).parent / "arm"

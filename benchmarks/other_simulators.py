@@ -22,9 +22,10 @@ import numpy as np
 from firmware import WORMS, random_network
 
 import annelid
-from annelid.export import controller_network, lems_text
 from annelid.nervous import Network
 from annelid.output import write_csv
+from annelid_lab.firmware import controller_network
+from annelid_lab.lems import lems_text
 
 PYLEMS = [sys.executable, "-c", "from lems.run import main; main()", "-nogui", "network.xml"], 1
 """How it is started, and how many steps come before the first row that it writes."""

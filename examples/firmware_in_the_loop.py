@@ -12,7 +12,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import annelid
-from annelid.export import HostFirmware, controller_firmware
+from annelid_lab.firmware import HostFirmware, controller_firmware
 
 
 def main(folder: Path, duration_s: float = 6.0) -> list[annelid.Run]:

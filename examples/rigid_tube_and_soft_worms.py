@@ -16,7 +16,7 @@ import numpy as np
 
 from annelid import load_config, simulate
 from annelid.draw.canvas import canvas, save
-from annelid.planar.huang import segment_length
+from annelid_studies.planar.huang import segment_length
 
 PROGRAM = {"kind": "program", "contractions": [{"segment": 2, "start_s": 0.0, "stop_s": 0.8}]}
 WORMS = {

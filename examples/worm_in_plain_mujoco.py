@@ -19,7 +19,7 @@ from annelid.body import build_spec, compile_spec
 
 
 def write(path: Path) -> None:
-    """Writes the paper's worm of rods, as `annelid build riddle2023-rods` does."""
+    """Writes the paper's worm of rods, as `annelid export riddle2023-rods --to mjcf` does."""
     spec = build_spec(load_config("riddle2023-rods"))
     compile_spec(spec)
     path.write_text(spec.to_xml(), encoding="utf-8")

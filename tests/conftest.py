@@ -10,12 +10,17 @@ from concurrent.futures import Executor, Future
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import settings
+from typer.testing import CliRunner
 
+from annelid.cli import app
 from annelid.config import ControllerKind, load_config
+from annelid.protocols import Sensation
 from annelid.simulation.loop import simulate
 from annelid.simulation.runfile import Run
+from outcome import Command, Outcome
 
 # No test is judged by its time: a busy machine is no failure.
 settings.register_profile("annelid", deadline=None)
@@ -91,3 +96,69 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
         patch.setenv(notebooks.CACHE_VARIABLE, str(tmp_path_factory.mktemp("tutorials")))
         patch.setattr(notebooks, "executed", lambda text: jupytext.reads(text, fmt="md"))
         return build_site.build(tmp_path_factory.mktemp("build"))
+
+
+@pytest.fixture
+def annelid(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Command:
+    """Runs a command in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+
+    def invoke(*arguments: str | Path) -> Outcome:
+        result = CliRunner().invoke(app, [str(argument) for argument in arguments], prog_name="annelid")
+        return Outcome(result.exit_code, result.stdout, result.stderr)
+
+    return invoke
+
+
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Runs draw nothing, for tests of what they compute and where they write it."""
+    monkeypatch.setattr("annelid.draw.gallery.draw_all", lambda *_, **__: [])
+
+
+@pytest.fixture(scope="session")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a planar run of one second, without pictures."""
+    folder = tmp_path_factory.mktemp("finished") / "run"
+    result = CliRunner().invoke(
+        app, ["run", "riddle2022-planar", "--duration", "1", "--no-video", "--quiet", "--out", str(folder)]
+    )
+    assert result.exit_code == 0, result.output
+    return folder
+
+
+def squeeze(sensation: Sensation) -> np.ndarray:
+    """Contracts all segments alike."""
+    return np.full(len(sensation.ring_length_m), 0.5)
+
+
+@pytest.fixture(scope="session")
+def planar_run(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    """A second of a planar worm."""
+    config = load_config("riddle2022-planar", {"duration_s": 1.0})
+    return simulate(config, tmp_path_factory.mktemp("planar") / "run", progress=False)
+
+
+@pytest.fixture(scope="session")
+def chain_run(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    """The same as a chain of capsules."""
+    config = load_config("riddle2023", {"duration_s": 0.02})
+    return simulate(config, tmp_path_factory.mktemp("chain") / "run", progress=False)
+
+
+@pytest.fixture(scope="session")
+def user_run(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    """The same worm under a user's function."""
+    config = load_config("riddle2023-rods", {"duration_s": 0.1})
+    return simulate(config, tmp_path_factory.mktemp("user") / "run", controller=squeeze, progress=False)
+
+
+@pytest.fixture(scope="session", params=["planar", "rods"])
+def run(request: pytest.FixtureRequest) -> Run:
+    """Either of the two."""
+    return request.getfixturevalue(f"{request.param}_run")
+
+
+@pytest.fixture
+def target(tmp_path: Path) -> Path:
+    return tmp_path / "out"

@@ -4,17 +4,25 @@ from __future__ import annotations
 
 import re
 import tomllib
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from annelid.body.worm import WormBody
-from annelid.config import RunConfig, field_paths, fields_of, load_config, parse_assignments, preset_names, preset_text
+from annelid.config import (
+    RunConfig,
+    field_paths,
+    fields_of,
+    load_config,
+    loading,
+    parse_assignments,
+    preset_names,
+    preset_text,
+)
 from annelid.config.sections import Section
 from annelid.errors import ConfigError
-from annelid.planar.sections import PlanarWorm
+from annelid_studies.planar.sections import PlanarWorm
 
 
 def leaves(tree: dict[str, Any], prefix: str = "") -> dict[str, Any]:
@@ -25,7 +33,7 @@ def leaves(tree: dict[str, Any], prefix: str = "") -> dict[str, Any]:
 
 
 def own_text(name: str) -> str:
-    return (resources.files("annelid") / "presets" / f"{name}.toml").read_text(encoding="utf-8")
+    return loading._files("presets")[name].read_text(encoding="utf-8")
 
 
 def notes(text: str) -> dict[str, str]:
@@ -42,7 +50,7 @@ def notes(text: str) -> dict[str, str]:
 
 @pytest.mark.parametrize("name", preset_names())
 def test_a_preset_or_its_ancestors_state_every_field_that_its_worm_has_with_its_source(name: str) -> None:
-    """No default hides behind a preset: what `annelid presets NAME` prints is the whole truth."""
+    """No default hides behind a preset: what `annelid list presets NAME` prints is the whole truth."""
     text = preset_text(name)
     config = load_config(name)
     stated = {path for path, value in leaves(tomllib.loads(text)).items() if value != "none"}
@@ -266,18 +274,24 @@ def test_unreadable_files_are_refused_in_one_sentence(tmp_path: Path) -> None:
         load_config(broken)
 
 
-@pytest.mark.parametrize(
-    "name", ["SnsController", "RobustSns", "Rods", "Floor", "PlanarWorm", "Mesh", "Contraction", "Arena"]
-)
-def test_names_of_the_first_edition_are_found_with_a_warning(name: str) -> None:
-    import annelid.config
-
-    with pytest.warns(DeprecationWarning, match=rf"annelid\.config\.{name} is now annelid\."):
-        assert issubclass(getattr(annelid.config, name), annelid.config.Section)
-
-
 def test_an_unknown_name_of_the_configuration_is_no_attribute() -> None:
     import annelid.config
 
     with pytest.raises(AttributeError, match="no attribute 'Nothing'"):
         _ = annelid.config.Nothing
+
+
+def test_names_that_have_moved_are_found_with_a_warning() -> None:
+    import annelid.export
+    import annelid.nervous
+    import annelid.planar
+
+    for package, name in (
+        (annelid.nervous, "phase_chain"),
+        (annelid.export, "Firmware"),
+        (annelid.planar, "Riddle2022Plant"),
+    ):
+        with pytest.warns(DeprecationWarning, match=rf"{name} is now annelid_(lab|studies)\."):
+            assert getattr(package, name)
+        with pytest.raises(AttributeError):
+            package.nosuch  # noqa: B018

@@ -13,7 +13,7 @@ from annelid.simulation import simulate
 from annelid_studies.crawling import HEADLINES, PERTURBED
 
 GAITS = Path(__file__).parent.parent / "docs" / "results" / "gaits.csv"
-"""What `annelid experiment gaits` found."""
+"""What `annelid study gaits` found."""
 CRAWLERS = ("crawler", "crawler-timed", "crawler-servo")
 FINER = ("half_step", "quarter_step", "element_more", "elements_more")
 CMMWORM_M_PER_S = 0.258 / 60.0

@@ -13,8 +13,8 @@ from bibtexparser.entrypoint import parse_string
 import annelid
 from annelid.config import ControllerKind, kinds_of, load_config, preset_names
 from annelid.config.kinds import every_kind
-from annelid.planar.sections import PlanarWorm
 from annelid.references import ALWAYS, bibtex, entries, references_of
+from annelid_studies.planar.sections import PlanarWorm
 
 ROOT = Path(__file__).parent.parent
 SOURCES = {

@@ -22,7 +22,7 @@ This page lists every field of a configuration. Set a field by its path, which i
 may leave out the unit at the end of a name (`arena.radius` for `arena.radius_m`). Lists are written `[0.5, 1.1]`.
 
 The defaults below are those of a configuration without a preset. A preset has its own values:
-`annelid presets riddle2023-rods --fields` prints them. Where a section has several kinds, its `kind` decides which
+`annelid list presets riddle2023-rods --fields` prints them. Where a section has several kinds, its `kind` decides which
 fields it has. If you change the kind, the section starts from the defaults of the new kind.
 """
 LARGEST = 1e15

@@ -9,7 +9,7 @@ A table stands between two comments. The first names the result files, the comma
 Python's ``{expression:format}`` for numbers; published numbers are written out:
 
     <!-- table: results/speed.csv
-    made by: annelid experiment speed -o speed
+    made by: annelid study speed -o speed
     | gait | friction | speed (cm/s) |
     |---|---|---|
     for each if quantity == "friction":

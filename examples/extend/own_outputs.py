@@ -2,7 +2,7 @@
 
     python examples/extend/own_outputs.py [folder]
 
-In an installed package, named by an entry point `annelid.kinds`, `annelid plot RUN --figure forces` and
+In an installed package, named by an entry point `annelid.kinds`, `annelid draw RUN --figure forces` and
 `annelid export RUN --to txt` find them. Takes a few seconds.
 """
 

@@ -2,7 +2,7 @@
 
     python examples/extend/own_study.py --friction 0.3
 
-In an installed package, named by an entry point `annelid.kinds`, `annelid experiment slippery` finds it. Its runs are
+In an installed package, named by an entry point `annelid.kinds`, `annelid study slippery` finds it. Its runs are
 kept in the folder, so that a second call takes no time. Takes a few seconds.
 """
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+__all__ = ["SLACK_S", "StepRatio"]
+
 SLACK_S = 5e-7
 """Half the shortest time step: sums of time steps, rounded, miss a given moment by less than this."""
 

@@ -22,6 +22,12 @@ __all__ = [
     "RunKilled",
     "SimulationStopped",
     "UnreadableText",
+    "listed",
+    "require_at_least",
+    "require_finite",
+    "require_positive",
+    "shortened",
+    "shown",
     "suggest",
 ]
 

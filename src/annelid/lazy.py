@@ -47,6 +47,26 @@ def lazy(package: str) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
     return get, lambda: sorted(sys.modules[package].__all__)
 
 
+def moved(package: str, now: str) -> Callable[[str], Any]:
+    """Returns the ``__getattr__`` of a package for names that lie elsewhere now: found with a warning, for one release.
+
+    Args:
+        package: The package's ``__name__``.
+        now: Name of the package that has them.
+    """
+
+    def get(name: str) -> Any:
+        import warnings
+
+        found = None if name.startswith("_") else getattr(import_module(now), name, None)
+        if found is None:
+            raise AttributeError(f"module {package!r} has no attribute {name!r}")
+        warnings.warn(f"{package}.{name} is now {now}.{name}", DeprecationWarning, stacklevel=2)
+        return found
+
+    return get
+
+
 def offered(package: ast.Module) -> dict[str, str]:
     """Returns the module of every name that a package's file imports, also where only type checkers read it."""
     import ast

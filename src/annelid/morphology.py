@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["Array", "Indices", "MeshGeometry", "helical_mesh"]
+__all__ = ["Array", "Indices", "MeshGeometry", "helical_mesh", "rhombus"]
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

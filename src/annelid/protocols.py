@@ -24,6 +24,7 @@ __all__ = [
     "Plant",
     "Recordable",
     "Records",
+    "SavedAndRecorded",
     "Sensation",
     "Signal",
     "State",

@@ -10,6 +10,8 @@ from importlib import resources
 from annelid.config import RunConfig
 from annelid.config.kinds import every_kind
 
+__all__ = ["ALWAYS", "bibtex", "entries", "references_of"]
+
 ALWAYS = {"annelid": "the simulator", "riddle2023": "the paper that it reproduces and builds on"}
 """Keys that every work with annelid cites, and what for."""
 

@@ -12,8 +12,10 @@ from typing import Any, Generic, TypeVar
 
 from annelid.errors import AnnelidError, ConfigError, shown, suggest
 
-GROUP = "annelid.kinds"
-"""Entry points of other packages: each names a module that registers something."""
+__all__ = ["COMMANDS", "FORMATS", "KINDS", "Registry", "load_extensions", "load_home"]
+
+KINDS, COMMANDS, FORMATS = "annelid.kinds", "annelid.commands", "annelid.formats"
+"""Groups of entry points: each entry names a module of another package that registers something when it is imported."""
 
 Item = TypeVar("Item")
 
@@ -27,9 +29,9 @@ def load_home(home: str) -> None:
 
 
 @cache
-def load_extensions() -> None:
-    """Imports what other installed packages name; one that fails is left out with a warning."""
-    for entry in entry_points(group=GROUP):
+def load_extensions(group: str = KINDS) -> None:
+    """Imports what installed packages name in a group; one that fails is left out with a warning."""
+    for entry in entry_points(group=group):
         try:
             entry.load()
         except Exception as error:
@@ -40,9 +42,12 @@ def load_extensions() -> None:
 class Registry(Generic[Item]):
     """Things of one sort by their names."""
 
-    def __init__(self, what: str, *homes: str, error: type[AnnelidError] = ConfigError) -> None:
-        """Makes an empty registry of what is called so in messages; its homes register some, imported on first use."""
-        self._what, self._homes, self._error = what, homes, error
+    def __init__(self, what: str, *homes: str, error: type[AnnelidError] = ConfigError, group: str = KINDS) -> None:
+        """Makes an empty registry of what is called so in messages.
+
+        Its homes and the entry points of its group register some; they are imported on first use.
+        """
+        self._what, self._homes, self._error, self._group = what, homes, error, group
         self._known: dict[str, Item] = {}
 
     def add(self, name: str, item: Item) -> Item:
@@ -57,7 +62,7 @@ class Registry(Generic[Item]):
         """Returns everything that is registered, in the order of the names."""
         for home in self._homes:
             load_home(home)
-        load_extensions()
+        load_extensions(self._group)
         return dict(sorted(self._known.items()))
 
     def find(self, name: str) -> Item:

@@ -14,6 +14,8 @@ from rich.text import Text
 
 from annelid.text import printable
 
+__all__ = ["REFRESH_S", "Console", "progress_bar"]
+
 REFRESH_S = 0.1
 """How long a progress bar stays as it is, at least, s."""
 

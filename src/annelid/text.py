@@ -7,6 +7,8 @@ from collections.abc import Iterable
 from typing import Any, TextIO, cast
 from unicodedata import category
 
+__all__ = ["is_line", "numbered", "printable", "write_printable_only"]
+
 _KEPT = frozenset("\n\t\N{ZERO WIDTH JOINER}\N{ZERO WIDTH NON-JOINER}")
 """Lines, and what writing systems and emoji need inside words."""
 

@@ -15,7 +15,17 @@ from typing import Any
 from annelid.errors import ConfigError, UnreadableText, shortened
 from annelid.text import printable
 
-__all__ = ["read_json", "read_text", "read_toml", "toml_text", "toml_value"]
+__all__ = [
+    "check_depth",
+    "parse_toml",
+    "parse_xml",
+    "read_bytes",
+    "read_json",
+    "read_text",
+    "read_toml",
+    "toml_text",
+    "toml_value",
+]
 
 MOST_BYTES = 8_000_000
 """Of a text that is read; the longest one that annelid writes, a network of 200 segments, has 6 MB."""

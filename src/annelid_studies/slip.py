@@ -16,21 +16,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from rich.table import Table as TerminalTable
 
-from annelid.analysis import (
-    Detection,
-    DetectionScore,
-    Estimate,
-    detect_slip,
-    mean_and_interval,
-    precision_recall,
-    score_detections,
-    slip_cost,
-)
+from annelid.analysis import Estimate, mean_and_interval, slip_cost
 from annelid.config import load_config
 from annelid.draw import canvas, draw_lines, panel_title, save_both
 from annelid.experiment import Case, Store, finer_steps
 from annelid.markdown import Table
 from annelid.output import write_csv
+from annelid_studies.slip_detector import Detection, DetectionScore, detect_slip, precision_recall, score_detections
 from annelid_studies.tables import terminal_table
 from annelid_studies.worms import Effort, drawn_frictions
 

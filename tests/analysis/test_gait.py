@@ -13,7 +13,6 @@ import pytest
 import xarray as xr
 from hypothesis import given
 from hypothesis import strategies as st
-from synthetic import wave_data
 
 import annelid
 from annelid.analysis import Gait, gait
@@ -21,6 +20,7 @@ from annelid.analysis.track import fitted_circle
 from annelid.config import check_config
 from annelid.draw.table import gait_rows
 from annelid.simulation.runfile import Run
+from synthetic import wave_data
 
 MASS_KG, LENGTH_M = 2.0, 0.5
 

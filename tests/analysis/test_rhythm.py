@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from synthetic import wave_activation
 
 from annelid.analysis.rhythm import contractions, full_cycles, is_wave, rhythm, segment_activation
+from synthetic import wave_activation
 
 
 def test_onset_is_interpolated_between_samples() -> None:

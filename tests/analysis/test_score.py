@@ -10,12 +10,12 @@ import pytest
 import xarray as xr
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from synthetic import wave_activation, wave_data
 
 from annelid.analysis import RhythmScore, lengthening_score, rhythm_score
 from annelid.analysis.rhythm import contractions, rhythm, score
 from annelid.config import load_config
 from annelid.simulation import Run, simulate
+from synthetic import wave_activation, wave_data
 
 INTERVAL_S = 0.005
 

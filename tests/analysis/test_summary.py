@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
-from synthetic import FIRST_HELIX_EXCESS, HOLDING_FORCE_N, PEAKS_M, wave_data
 
 from annelid.analysis import Summary, summary
 from annelid.analysis.paper import published
 from annelid.config import check_config, field_paths, load_config, preset_names
 from annelid.config.run import published_worms
 from annelid.simulation.runfile import Run
+from synthetic import FIRST_HELIX_EXCESS, HOLDING_FORCE_N, PEAKS_M, wave_data
 
 PROMISED = {
     "order", "onsets_s", "period_s", "elongation_first_helix_pp_m", "elongation_mean_max_m", "middle_deficit",

@@ -11,13 +11,13 @@ from typing import Any
 
 import mujoco
 import pytest
-from outcome import Command
 from typer.main import get_command
 
 from annelid.arena.kinds.pipe import Pipe
 from annelid.cli import app
 from annelid.config import field_paths, load_config, preset_names
 from annelid.simulation.runfile import open_run
+from outcome import Command
 
 
 def test_run_ends_with_table_file_and_pictures(annelid: Command) -> None:
@@ -100,11 +100,11 @@ def test_show_prints_the_published_period_beside_ours(annelid: Command, finished
 
 
 def test_plot_and_render_write_where_they_are_told(annelid: Command, finished: Path) -> None:
-    assert annelid("plot", finished, "-o", "f.svg").exit_code == 0
+    assert annelid("draw", finished, "-o", "f.svg").exit_code == 0
     assert Path("f.svg").read_text().lstrip().startswith("<?xml")
-    assert annelid("plot", finished, "--figure", "network", "-o", "n.svg").out.split() == ["n.svg"]
+    assert annelid("draw", finished, "--figure", "network", "-o", "n.svg").out.split() == ["n.svg"]
     assert 'id="neuron-contraction_1"' in Path("n.svg").read_text()
-    done = annelid("render", finished, "--time", "0.5", "-o", "frame.jpg", "--video", "v.mp4", "--fps", "5")
+    done = annelid("draw", finished, "--time", "0.5", "-o", "frame.jpg", "--video", "v.mp4", "--fps", "5")
     assert done.exit_code == 0, done.err
     assert done.out.split() == ["frame.jpg", "v.mp4"]
     assert Path("v.mp4").stat().st_size > 1000
@@ -114,10 +114,10 @@ def test_render_takes_a_background_and_refuses_a_strip_of_a_planar_worm(annelid:
     import imageio.v3
 
     for name, corner in (("dark", [20, 22, 26]), ("white", [255, 255, 255])):
-        done = annelid("render", finished, "--time", "0.5", "-o", f"{name}.png", "--background", name)
+        done = annelid("draw", finished, "--time", "0.5", "-o", f"{name}.png", "--background", name)
         assert done.exit_code == 0, done.err
         assert imageio.v3.imread(f"{name}.png")[0, 0, :3].tolist() == corner
-    done = annelid("render", finished, "--strip", "s.pdf")
+    done = annelid("draw", finished, "--strip", "s.pdf")
     assert done.exit_code == 2
     assert "planar" in done.err
     assert not Path("s.pdf").exists()
@@ -144,7 +144,7 @@ def test_build_writes_what_plain_mujoco_loads_and_steps(annelid: Command) -> Non
     import mujoco
     import numpy as np
 
-    done = annelid("build", "riddle2023-rods", "-o", "worm.xml", "--segments", "4")
+    done = annelid("export", "--to", "mjcf", "riddle2023-rods", "-o", "worm.xml", "--segments", "4")
     assert done.exit_code == 0, done.err
     model = mujoco.MjModel.from_xml_path("worm.xml")
     assert model.nu == 4
@@ -176,21 +176,21 @@ def test_the_first_run_is_the_worm_with_soft_pins_and_says_what_it_compares_with
     assert "reference" in words
     assert "deviation" in words
     assert "this run differs from riddle2023-fast in duration_s" in words
-    longer = annelid("build", "--segments", "4", "-o", "four.xml")
+    longer = annelid("check", "--segments", "4")
     assert "--segments without a preset takes riddle2023-rods" in longer.sentence()
 
 
 def test_presets_lists_prints_and_explains(annelid: Command) -> None:
-    listing = annelid("presets").out
+    listing = annelid("list", "presets").out
     assert all(name in listing for name in preset_names())
-    text = annelid("presets", "riddle2023").out
+    text = annelid("list", "presets", "riddle2023").out
     Path("copy.toml").write_text(text)
     assert annelid("run", "copy.toml", "--set", "duration_s=-1").sentence().startswith("duration_s = -1")
-    fields = annelid("presets", "riddle2022-planar", "--fields").out
+    fields = annelid("list", "presets", "riddle2022-planar", "--fields").out
     assert "body.gain = 1.3" in fields
     assert "body.mesh" not in fields
     meaning = field_paths()["arena.friction"]
-    assert meaning in annelid("presets", "--fields").out
+    assert meaning in annelid("list", "presets", "--fields").out
 
 
 def test_doctor_ends_well(annelid: Command) -> None:
@@ -200,20 +200,45 @@ def test_doctor_ends_well(annelid: Command) -> None:
 
 
 def test_lists_are_printed_as_json(annelid: Command) -> None:
-    presets = {each["name"]: each for each in json.loads(annelid("presets", "--json").out)}
+    presets = {each["name"]: each for each in json.loads(annelid("list", "presets", "--json").out)}
     assert set(presets) == set(preset_names())
     assert presets["riddle2023-fast"]["n_segments"] == 3
-    assert "pipe.bend" in {each["name"] for each in json.loads(annelid("arenas", "--json").out)}
+    assert "pipe.bend" in {each["name"] for each in json.loads(annelid("list", "arenas", "--json").out)}
     assert {"item": "annelid", "ok": True}.items() <= json.loads(annelid("doctor", "--json").out)[0].items()
-    for wrong in (("presets", "wang"), ("arenas", "floor"), ("doctor", "--report")):
+    for wrong in (("list", "presets", "wang"), ("list", "arenas", "floor"), ("doctor", "--report")):
         assert annelid(*wrong, "--json").exit_code == 2
 
 
-@pytest.mark.parametrize("command", ["run", "build", "show", "plot", "render", "bench", "presets", "doctor"])
-def test_every_command_teaches_by_example(annelid: Command, command: str) -> None:
-    done = annelid(command, "--help")
-    assert done.exit_code == 0
-    assert f"\n  annelid {command}" in done.out
+def test_every_command_teaches_by_example(annelid: Command) -> None:
+    def commands(group: Any, *above: str) -> Iterator[tuple[str, ...]]:
+        for name, one in group.commands.items():
+            yield from commands(one, *above, name) if hasattr(one, "commands") else [(*above, name)]
+
+    silent = []
+    for words in commands(get_command(app)):
+        done = annelid(*words, "--help")
+        assert done.exit_code == 0
+        if not re.search(rf"\n  annelid (study )?{' '.join(words)}", done.out):
+            silent.append(words)
+    assert not silent
+
+
+def test_the_help_fits_a_page_and_cuts_no_line(annelid: Command) -> None:
+    text = annelid("--help").out
+    panels = text.partition("\nMake:")[2]
+    assert len(re.findall(r"^  [a-z]", panels, re.MULTILINE)) <= 16
+    for words in (("--help",), ("study", "--help"), ("list", "--help")):
+        assert "...\n" not in annelid(*words).out.partition("\n")[2]
+
+
+@pytest.mark.parametrize(
+    ("old", "now"),
+    [(("plot", "RUN"), "draw"), (("presets", "wang"), "list presets"), (("experiment", "--help"), "study")],
+)
+def test_an_old_name_goes_on_with_a_hint(annelid: Command, finished: Path, old: tuple[str, ...], now: str) -> None:
+    done = annelid(*(finished if word == "RUN" else word for word in old))
+    assert f"hint: annelid {old[0]} is now annelid {now}" in done.err
+    assert done.out
 
 
 def test_every_option_with_a_unit_says_it() -> None:
@@ -248,8 +273,8 @@ def test_help_and_version_come_from_the_module_as_well() -> None:
 
 @pytest.mark.usefixtures("undrawn")
 def test_arenas_are_listed_printed_built_and_walked_in(annelid: Command) -> None:
-    assert "pipe.hourglass" in annelid("arenas").out
-    assert 'course = "bend"' in annelid("arenas", "pipe.bend").out
+    assert "pipe.hourglass" in annelid("list", "arenas").out
+    assert 'course = "bend"' in annelid("list", "arenas", "pipe.bend").out
     short = ("--duration", "0.1", "--no-video", "-q", "--out", "bent")
     walked = annelid("run", "riddle2023-rods", "--arena", "pipe.bend", "--set", "arena.radius=0.5", *short)
     assert walked.exit_code == 0, walked.err
@@ -260,7 +285,9 @@ def test_arenas_are_listed_printed_built_and_walked_in(annelid: Command) -> None
 
 
 def test_a_worm_in_a_pipe_is_written_with_walls_that_stand_still(annelid: Command) -> None:
-    assert annelid("build", "riddle2023-rods", "--arena", "pipe.taper", "-o", "piped.xml").exit_code == 0
+    assert (
+        annelid("export", "--to", "mjcf", "riddle2023-rods", "--arena", "pipe.taper", "-o", "piped.xml").exit_code == 0
+    )
     model = mujoco.MjModel.from_xml_path("piped.xml")
     data = mujoco.MjData(model)
     for _ in range(100):
@@ -271,7 +298,7 @@ def test_a_worm_in_a_pipe_is_written_with_walls_that_stand_still(annelid: Comman
 
 
 def test_friction_that_depends_on_the_direction_is_not_written_as_another(annelid: Command) -> None:
-    refused = annelid("build", "riddle2023-rods", "--arena", "setae")
+    refused = annelid("export", "--to", "mjcf", "riddle2023-rods", "--arena", "setae")
     assert refused.exit_code == 2
     assert "arena.backward_friction = 1.0 cannot be written" in refused.err
 

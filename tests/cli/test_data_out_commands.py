@@ -7,10 +7,10 @@ import shutil
 from pathlib import Path
 
 import pytest
-from outcome import Command
 
 from annelid.draw import doctor
 from annelid.simulation.runfile import open_run
+from outcome import Command
 
 
 @pytest.fixture

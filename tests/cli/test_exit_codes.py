@@ -10,11 +10,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from outcome import STUDY, Command
 
 from annelid.cli import entry
 from annelid.errors import RunKilled
 from annelid.experiment.sweep import Sweep
+from outcome import STUDY, Command
 
 pytestmark = pytest.mark.usefixtures("runs_in_this_process")
 
@@ -83,7 +83,7 @@ def test_a_benchmark_tells_of_cases_that_were_not_measured(
 
     monkeypatch.setattr("annelid_studies.bench.benchmark.bench", bench)
     monkeypatch.setattr("annelid_studies.bench.report.bench_figure", lambda *_: Path("bench.png"))
-    done = annelid("bench", "--quiet")
+    done = annelid("study", "bench", "--quiet")
     assert done.exit_code == code, done.err
     assert ("of 2 runs" in done.err) == bool(failed)
 

@@ -9,9 +9,9 @@ import time
 from pathlib import Path
 
 import pytest
-from outcome import Command
 
 from annelid.errors import SimulationStopped
+from outcome import Command
 
 
 @pytest.mark.parametrize(
@@ -27,20 +27,20 @@ from annelid.errors import SimulationStopped
         (("run", "--duration", "-1"), "duration_s = -1"),
         (("run", "--fidelity", "acurate"), "did you mean 'accurate'"),
         (("run", "riddle2022-planar", "--fidelity", "fast"), "fidelity = 'fast' is for the 3D worm"),
-        (("build", "riddle2023-fast", "--fidelity", "preview"), "share their pins"),
+        (("export", "--to", "mjcf", "riddle2023-fast", "--fidelity", "preview"), "share their pins"),
         (("run", "nothere.toml"), "cannot read the configuration file nothere.toml"),
         (("run", "--resume", "nothere"), "there is no run file nothere"),
-        (("build", "riddle2022-planar"), "has no MuJoCo model"),
+        (("export", "--to", "mjcf", "riddle2022-planar"), "has no MuJoCo model"),
         (("export-network", "nothere.toml"), "cannot read the configuration file nothere.toml"),
         (("export-network", "crawler-timed"), "only controllers that step a network can"),
         (
-            ("build", "riddle2023-rods", "-o", "no/such/worm.xml"),
+            ("export", "--to", "mjcf", "riddle2023-rods", "-o", "no/such/worm.xml"),
             "cannot be written: there is no folder no/such",
         ),
         (("show", "nothere"), "there is no run file nothere"),
-        (("plot", "nothere"), "there is no run file nothere"),
-        (("render", "nothere", "--time", "1"), "there is no run file nothere"),
-        (("presets", "ridle2023"), "did you mean 'riddle2023'"),
+        (("draw", "nothere"), "there is no run file nothere"),
+        (("draw", "nothere", "--time", "1"), "there is no run file nothere"),
+        (("list", "presets", "ridle2023"), "did you mean 'riddle2023'"),
     ],
 )
 def test_bad_input_ends_in_one_sentence_and_leaves_nothing(
@@ -60,8 +60,7 @@ def test_bad_input_ends_in_one_sentence_and_leaves_nothing(
         ("run", "--duration", "long"),
         ("run", "--duration", "nan"),
         ("crawl",),
-        ("render", "somewhere"),
-        ("render", "somewhere", "-o", "frame.png", "--video", "v.mp4"),
+        ("draw", "somewhere", "-o", "frame.png", "--video", "v.mp4"),
     ],
 )
 def test_wrong_usage_is_exit_2_without_a_traceback(annelid: Command, arguments: tuple[str, ...]) -> None:
@@ -80,7 +79,7 @@ def test_a_used_output_folder_is_refused_and_left_alone(annelid: Command) -> Non
     assert [path.name for path in Path("out").iterdir()] == ["notes.txt"]
 
 
-@pytest.mark.parametrize("arguments", [("plot", "-o"), ("render", "--time", "0.5", "-o"), ("render", "--video")])
+@pytest.mark.parametrize("arguments", [("draw", "-o"), ("draw", "--time", "0.5", "-o"), ("draw", "--video")])
 def test_existing_pictures_are_kept_unless_forced(annelid: Command, finished: Path, arguments: tuple[str, ...]) -> None:
     target = Path("v.mp4" if "--video" in arguments else "p.png")
     target.write_text("mine")
@@ -96,15 +95,15 @@ def test_existing_pictures_are_kept_unless_forced(annelid: Command, finished: Pa
 
 def test_existing_models_are_kept_unless_forced(annelid: Command) -> None:
     Path("worm.xml").write_text("mine")
-    assert "worm.xml exists" in annelid("build", "riddle2023-rods").sentence()
+    assert "worm.xml exists" in annelid("export", "--to", "mjcf", "riddle2023-rods").sentence()
     assert Path("worm.xml").read_text() == "mine"
-    assert annelid("build", "riddle2023-rods", "--force").exit_code == 0
+    assert annelid("export", "--to", "mjcf", "riddle2023-rods", "--force").exit_code == 0
     assert "<mujoco" in Path("worm.xml").read_text()
 
 
 @pytest.mark.parametrize(
     ("arguments", "option", "name"),
-    [(("plot",), "-o", "figure7.png"), (("render", "--time", "0.5"), "-o", "frame.png")],
+    [(("draw",), "-o", "figure7.png"), (("draw", "--time", "0.5"), "-o", "frame.png")],
 )
 def test_a_runs_own_pictures_are_drawn_anew_unless_they_are_named(
     annelid: Command, finished: Path, arguments: tuple[str, ...], option: str, name: str
@@ -121,23 +120,23 @@ def test_a_runs_own_pictures_are_drawn_anew_unless_they_are_named(
 
 def test_a_name_without_suffix_does_not_replace_the_png(annelid: Command, finished: Path) -> None:
     Path("mine.png").write_text("mine")
-    done = annelid("plot", finished, "-o", "mine")
+    done = annelid("draw", finished, "-o", "mine")
     assert done.exit_code == 2
     assert "mine.png exists" in done.sentence()
     assert Path("mine.png").read_text() == "mine"
-    assert annelid("plot", finished, "-o", "other").out.split() == ["other.png"]
+    assert annelid("draw", finished, "-o", "other").out.split() == ["other.png"]
     assert [path.name for path in Path().iterdir() if path.name.startswith("other")] == ["other.png"]
 
 
 @pytest.mark.parametrize("name", ["a.xyz", "a.jpg", ""])
 def test_plot_writes_three_formats_only(annelid: Command, finished: Path, name: str) -> None:
-    done = annelid("plot", finished, "-o", name)
+    done = annelid("draw", finished, "-o", name)
     assert done.exit_code == 2
     assert ".png, .pdf, .svg" in done.sentence() or "is a folder" in done.sentence()
     assert list(Path().iterdir()) == []
 
 
-@pytest.mark.parametrize("command", [("run",), ("build",), ("presets", "--fields")])
+@pytest.mark.parametrize("command", [("run",), ("list", "presets", "--fields")])
 def test_an_empty_name_is_not_the_default(annelid: Command, command: tuple[str, ...]) -> None:
     done = annelid(*command, "")
     assert done.exit_code == 2
@@ -173,7 +172,7 @@ def test_a_runs_folder_that_was_there_stays(annelid: Command) -> None:
 
 
 def test_fps_beyond_240_are_refused(annelid: Command, finished: Path) -> None:
-    done = annelid("render", finished, "--video", "v.mp4", "--fps", "241")
+    done = annelid("draw", finished, "--video", "v.mp4", "--fps", "241")
     assert done.exit_code == 2
     assert "fps = 241" in done.sentence()
 
@@ -182,14 +181,14 @@ def test_a_foreign_and_a_truncated_file_are_refused(annelid: Command, finished: 
     Path("foreign.nc").write_text("not netCDF")
     Path("half.nc").write_bytes((finished / "run.nc").read_bytes()[:5000])
     for name in ("foreign.nc", "half.nc"):
-        for command in (("show", name), ("plot", name), ("render", name, "--time", "0")):
+        for command in (("show", name), ("draw", name), ("draw", name, "--time", "0")):
             done = annelid(*command)
             assert done.exit_code == 2
             assert name in done.sentence()
 
 
 def test_a_time_that_was_not_recorded_is_refused(annelid: Command, finished: Path) -> None:
-    done = annelid("render", finished, "--time", "7", "-o", "late.png")
+    done = annelid("draw", finished, "--time", "7", "-o", "late.png")
     assert done.exit_code == 2
     assert "recorded from 0 to 1 s" in done.sentence()
     assert not Path("late.png").exists()
@@ -197,7 +196,7 @@ def test_a_time_that_was_not_recorded_is_refused(annelid: Command, finished: Pat
 
 def test_a_back_end_that_the_engine_does_not_know_is_a_sentence(tmp_path: Path) -> None:
     done = subprocess.run(
-        [sys.executable, "-m", "annelid", "build", "riddle2023-rods"],
+        [sys.executable, "-m", "annelid", "export", "riddle2023-rods", "--to", "mjcf"],
         cwd=tmp_path,
         env={**os.environ, "MUJOCO_GL": "vulkan"},
         capture_output=True,
@@ -215,7 +214,7 @@ def test_a_full_disk_is_a_sentence(annelid: Command, finished: Path, monkeypatch
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "figure.png")
 
     monkeypatch.setattr("annelid.draw.plots.save", full)
-    done = annelid("plot", finished, "-o", "figure.png")
+    done = annelid("draw", finished, "-o", "figure.png")
     assert done.exit_code == 2
     assert done.sentence() == f"figure.png: {os.strerror(errno.ENOSPC)}"
 

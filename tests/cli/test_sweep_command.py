@@ -17,11 +17,11 @@ import numpy as np
 import psutil
 import pytest
 import xarray as xr
-from outcome import Command
 
 from annelid.cli.entry import EXIT_SOME_FAILED
 from annelid.experiment.outcome import OUTCOME_NAME
 from annelid.experiment.store import DRAFTS
+from outcome import Command
 
 SHORT = """
 preset = "riddle2022-planar"

@@ -3,9 +3,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from outcome import Command
 
 from annelid.config import load_config
+from outcome import Command
 
 pytestmark = pytest.mark.usefixtures("runs_in_this_process")
 
@@ -30,7 +30,7 @@ def test_bad_input_ends_in_one_sentence_before_anything_runs(
     assert not list(Path().iterdir())
 
 
-@pytest.mark.parametrize("command", [("tune",), ("experiment", "speed")])
+@pytest.mark.parametrize("command", [("tune",), ("study", "speed")])
 def test_results_need_a_folder(annelid: Command, command: tuple[str, ...]) -> None:
     Path("taken").write_text("mine")
     done = annelid(*command, "-o", "taken")

@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from outcome import Command
 
 from annelid.experiment import uncertainty as package
 from annelid.simulation.runfile import open_run
+from outcome import Command
 
 pytestmark = pytest.mark.usefixtures("runs_in_this_process")
 
@@ -31,7 +31,7 @@ def test_a_run_with_error_bars_leaves_all_its_files_and_goes_on(annelid: Command
     assert open_run("walk").config.duration_s == 0.1
     content = json.loads(Path("walk/uncertainty.json").read_text())
     assert list(content["varied"]) == ["young_modulus", "dry_friction", "cable_friction"]
-    assert [run["kind"] for run in content["runs"]].count("drawn") == 2
+    assert [run["kind"] for run in content["list", "runs"]].count("drawn") == 2
 
     before = {path: path.stat().st_mtime_ns for path in Path("walk/uncertainty").glob("*/run.nc")}
     assert len(before) == 7

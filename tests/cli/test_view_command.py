@@ -47,18 +47,6 @@ def test_a_run_takes_no_changes(tmp_path: Path) -> None:
     assert "there is no run file" in refusal(str(tmp_path))
 
 
-@pytest.mark.parametrize(
-    ("words", "reason"),
-    [
-        (("--measured", "robot.csv"), "needs both --measured TABLE and --map MAP.toml"),
-        (("--map", "robot.toml"), "needs both --measured TABLE and --map MAP.toml"),
-        (("--measured", "robot.csv", "--map", "robot.toml"), "beside a recorded run in the browser"),
-    ],
-)
-def test_a_log_needs_its_map_and_a_run(words: tuple[str, ...], reason: str) -> None:
-    assert reason in refusal(*words)
-
-
 def test_a_page_is_not_overwritten_and_goes_without_a_window(tmp_path: Path) -> None:
     page = tmp_path / "walk.html"
     page.write_text("mine")

@@ -140,7 +140,7 @@ def test_a_run_goes_on_bit_for_bit_and_its_network_can_be_drawn(tmp_path: Path) 
 @pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler called cc")
 @pytest.mark.parametrize("slope", [None, 0.3])
 def test_it_is_the_same_in_c(slope: float | None, tmp_path: Path) -> None:
-    from annelid.export import HostFirmware, controller_firmware
+    from annelid_lab.firmware import HostFirmware, controller_firmware
 
     inputs = {
         "stretch of segment1": Sense("lengthening_m", 0, gain=400.0),

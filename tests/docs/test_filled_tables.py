@@ -42,7 +42,7 @@ EXCEPTIONS = {
     ("docs/validation.md", "formulation"): "printed by `pytest -m slow -s tests/body/test_ring_down.py`",
     ("docs/validation.md", "step (ms)"): "the same",
     ("docs/wire.md", "bytes"): "the protocol, not results",
-    ("docs/weak_middle.md", "cause"): "printed by `annelid experiment weak-middle`, which writes it into no file",
+    ("docs/weak_middle.md", "cause"): "printed by `annelid study weak-middle`, which writes it into no file",
 }
 """Tables of numbers without a result file, by page and first head, and why."""
 
@@ -101,7 +101,7 @@ LISTS = sorted(path for path in (DOCS / "results").glob("*.toml") if "[runs]" in
 PAGE = """# Gaits
 
 <!-- table: results/gaits.csv, results/bench.json:levels
-made by: annelid experiment speed -o speed
+made by: annelid study speed -o speed
 | gait | of friction | speed | elongation |
 |---|---|---|---|
 for each if run != "fast":
@@ -229,7 +229,7 @@ def test_a_table_waits_for_its_file(docs: Path) -> None:
     page = filled(PAGE, docs)
     (docs / "results" / "gaits.csv").unlink()
     assert filled(page, docs) == page
-    assert waiting(page, docs) == {"results/gaits.csv": "annelid experiment speed -o speed"}
+    assert waiting(page, docs) == {"results/gaits.csv": "annelid study speed -o speed"}
 
 
 @pytest.mark.parametrize(

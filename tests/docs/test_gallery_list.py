@@ -1,4 +1,4 @@
-"""The list of `annelid gallery` is that of the pictures and of the pages that show them; the command remakes them."""
+"""The list of `annelid study gallery` is that of the pictures and of their pages; the command remakes them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from test_doc_commands import check_annelid, check_program
 from typer.testing import CliRunner
 
 from annelid.cli import app
-from annelid.cli.gallery import cases, makers, pictures
+from annelid_studies.commands.gallery import cases, makers, pictures
 from fill_tables import MARKED
 
 GALLERY = "docs/gallery.md"
@@ -84,7 +84,7 @@ def test_a_worm_is_drawn_once_its_run_is_there(tmp_path: Path, monkeypatch: pyte
     short = {"command": "annelid run riddle2022-planar --duration 0.2", "minutes": 0.1, "pages": []}
     listed = {"walk.png": short | {"maker": "frame", "time_s": 0.1}, "figure7.png": short | {"maker": "figure7"}}
     known = {name: type(pictures()["worm.png"])(**one) for name, one in listed.items()}
-    monkeypatch.setattr("annelid.cli.gallery.pictures", lambda: known)
+    monkeypatch.setattr("annelid_studies.commands.gallery.pictures", lambda: known)
     for _ in range(2):
         done = CliRunner().invoke(app, ["gallery", "-q", "-o", f"{tmp_path}/made", "--kept", f"{tmp_path}/kept"])
         assert done.exit_code == 0, done.output

@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 from doc_commands import Command, Script, Written, commands_of, steps_of
 
-from annelid.analysis.agreement import run_series
 from annelid.simulation.runfile import open_run
+from annelid_lab.logs.agreement import run_series
 
 
 @dataclass(frozen=True)
@@ -53,8 +53,8 @@ TASKS = {
         (
             "annelid run -o first",
             "annelid show first",
-            "annelid plot first -o lengths.png",
-            "annelid render first --time 1.5 -o contracted.png",
+            "annelid draw first -o lengths.png",
+            "annelid draw first --time 1.5 -o contracted.png",
         ),
         python=True,
         gives=("first/run.nc", "lengths.png", "contracted.png"),

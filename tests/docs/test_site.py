@@ -101,7 +101,7 @@ def test_the_reference_has_every_public_name() -> None:
 def texts_of_the_source() -> set[str]:
     """All texts in the source, with … in place of what is filled in."""
     texts = set()
-    for path in sorted((ROOT / "src" / "annelid").rglob("*.py")):
+    for path in sorted((ROOT / "src").rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.JoinedStr):
                 parts = (str(part.value) if isinstance(part, ast.Constant) else "…" for part in node.values)

@@ -115,7 +115,7 @@ def test_a_name_is_one_line_of_printable_text(text: str, tmp_path: Path) -> None
 def test_a_name_of_markup_is_shown_as_it_is(folder: Path, tmp_path: Path) -> None:
     assert NAME.split()[0] in annelid("show", folder)
     assert json.loads(annelid("show", folder, "--json"))["name"] == NAME
-    annelid("plot", folder, "-o", tmp_path / "figure7.svg")
+    annelid("draw", folder, "-o", tmp_path / "figure7.svg")
     assert "$$" in (tmp_path / "figure7.svg").read_text()
     ET.parse(tmp_path / "figure7.svg")
     annelid("cite", folder)
@@ -136,7 +136,7 @@ def test_runs_in_folders_of_any_name_are_compared(folder: Path, tmp_path: Path) 
 def test_a_strangers_run_is_shown_and_exported_as_text(hostile: Run, tmp_path: Path) -> None:
     assert "\\u202egnp.exe" in annelid("show", hostile.path)
     json.loads(annelid("show", hostile.path, "--json"))
-    annelid("plot", hostile.path, "-o", tmp_path / "figure7.png")
+    annelid("draw", hostile.path, "-o", tmp_path / "figure7.png")
     annelid("export", hostile.path, "--to", "csv", "-q", "-o", tmp_path / "csv")
     for table in (tmp_path / "csv").glob("*.csv"):
         text = table.read_text()
@@ -256,7 +256,9 @@ def test_networks_are_drawn_with_any_names() -> None:
 
 
 def test_mjcf_of_any_name_is_xml(tmp_path: Path) -> None:
-    annelid("build", "riddle2023-rods", "--set", f"name={json.dumps(NAME)}", "-o", tmp_path / "worm.xml")
+    annelid(
+        "export", "--to", "mjcf", "riddle2023-rods", "--set", f"name={json.dumps(NAME)}", "-o", tmp_path / "worm.xml"
+    )
     assert ET.parse(tmp_path / "worm.xml").getroot().get("model") == NAME
 
 

@@ -70,7 +70,9 @@ def test_where_interruptions_are_ignored_they_stay_so(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="there is no device that is always full")
-@pytest.mark.parametrize("arguments", [["--help"], ["run", "--help"], ["presets"], ["presets", "riddle2023"]])
+@pytest.mark.parametrize(
+    "arguments", [["--help"], ["run", "--help"], ["list", "presets"], ["list", "presets", "riddle2023"]]
+)
 def test_a_full_device_is_a_sentence(arguments: list[str]) -> None:
     with open("/dev/full", "w") as full:
         done = subprocess.run(
@@ -114,7 +116,11 @@ def test_a_back_end_of_matplotlib_that_is_not_there_does_no_harm(tmp_path: Path)
 
 def test_a_terminal_that_knows_ascii_only_is_served(tmp_path: Path) -> None:
     (tmp_path / "w.toml").write_text('extends = "riddle2022-planar"\nsummary = "🪱"\n', encoding="utf-8")
-    for arguments in (["presets"], ["presets", "riddle2023"], ["presets", "w.toml", "--fields"]):
+    for arguments in (
+        ["list", "presets"],
+        ["list", "presets", "riddle2023"],
+        ["list", "presets", "w.toml", "--fields"],
+    ):
         done = subprocess.run(
             [sys.executable, "-m", "annelid", *arguments],
             cwd=tmp_path,

@@ -50,7 +50,7 @@ def test_the_other_is_told_who_writes_and_changes_nothing(tmp_path: Path) -> Non
     before = {entry: entry.stat().st_mtime_ns for entry in folder.iterdir()}
     with pytest.raises(RunFileError, match=rf"process {process.pid} \(since 20\d\d-.*: -c\) writes into the folder"):
         simulate(load_config(PLANAR, {"duration_s": 0.05}), folder, overwrite=True)
-    for words in (["run", PLANAR, "-o"], ["calibrate", "-o"], ["bench", "-o"], ["experiment", "pipes", "-o"]):
+    for words in (["run", PLANAR, "-o"], ["calibrate", "-o"], ["study", "bench", "-o"], ["study", "pipes", "-o"]):
         done = CliRunner().invoke(app, [*words, str(folder)])
         assert done.exit_code == 2
         assert f"process {process.pid}" in done.stderr
@@ -126,7 +126,7 @@ def test_a_folder_that_cannot_be_made_is_said_to_be_one() -> None:
 
 
 @pytest.mark.parametrize(
-    "words", [("calibrate",), ("experiment", "load-frame"), ("experiment", "weak-middle"), ("sweep", "study.toml")]
+    "words", [("calibrate",), ("study", "load-frame"), ("study", "weak-middle"), ("sweep", "study.toml")]
 )
 def test_an_output_that_is_a_file_is_refused_before_anything_is_computed(
     words: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -142,7 +142,12 @@ def test_an_output_that_is_a_file_is_refused_before_anything_is_computed(
 
 
 @pytest.mark.parametrize(
-    "words", [("limit-cycle", "-o", "no/a.png"), ("build", "-o", "no/a.xml"), ("limit-cycle", "-o", "closed/a.png")]
+    "words",
+    [
+        ("study", "limit-cycle", "-o", "no/a.png"),
+        ("export", "--to", "mjcf", "-o", "no/a.xml"),
+        ("study", "limit-cycle", "-o", "closed/a.png"),
+    ],
 )
 def test_an_output_that_cannot_be_written_is_refused_before_anything_is_computed(
     words: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -150,7 +155,7 @@ def test_an_output_that_cannot_be_written_is_refused_before_anything_is_computed
     monkeypatch.chdir(tmp_path)
     (tmp_path / "closed").mkdir()
     monkeypatch.setattr("annelid.cli.common.os.access", lambda path, mode: str(path) != "closed")
-    monkeypatch.setattr("annelid.analysis.limit_cycle.limit_cycle", lambda *_, **__: pytest.fail("computed"))
+    monkeypatch.setattr("annelid_studies.limit_cycle.cycle.limit_cycle", lambda *_, **__: pytest.fail("computed"))
     done = CliRunner().invoke(app, list(words))
     assert done.exit_code == 2
     assert f"{words[-1]} cannot be written" in done.stderr
@@ -185,7 +190,7 @@ def test_numbered_folders_are_taken_once(tmp_path: Path, monkeypatch: pytest.Mon
 
     with ThreadPoolExecutor(16) as threads:
         taken = [each.result() for each in [threads.submit(begin) for _ in range(16)]]
-    assert sorted(taken) == [Path("runs", f"worm-{i:03d}") for i in range(1, 17)]
+    assert sorted(taken) == [Path("list", "runs", f"worm-{i:03d}") for i in range(1, 17)]
     # Nothing was written into them.
     assert list(tmp_path.glob("*/*")) == []
 

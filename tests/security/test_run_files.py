@@ -133,7 +133,7 @@ def test_what_no_run_file_holds_is_refused_before_it_is_read(run: Run, folder: P
 def test_commands_tell_of_what_no_run_file_holds_in_a_sentence(run: Run, folder: Path, attack: str) -> None:
     path = changed(run, folder / "run.nc", ATTACKS[attack])
     before = sorted(folder.iterdir())
-    for arguments in (["export", path, "--to", "csv", "-o", "csv"], ["show", path], ["plot", path, "-o", "a.png"]):
+    for arguments in (["export", path, "--to", "csv", "-o", "csv"], ["show", path], ["draw", path, "-o", "a.png"]):
         done = CliRunner().invoke(app, [str(argument) for argument in arguments])
         assert done.exit_code == 2, done.output
         assert len(done.stderr.splitlines()) == 1

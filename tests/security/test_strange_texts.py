@@ -14,11 +14,11 @@ import pytest
 from annelid import Network, simulate
 from annelid.config import load_config, load_study, parse_assignments
 from annelid.errors import AnnelidError, SimulationStopped
-from annelid.experiment.load_frame import read_loop
 from annelid.experiment.spread import read_spread
 from annelid.nervous import GapJunction, Gate, ModulatorySynapse, Neuron, SpikingSynapse, Synapse
 from annelid.nervous.neurons import Channel, Firing
 from annelid.textfiles import MOST_BYTES, parse_toml
+from annelid_lab.load_frame import read_loop
 from annelid_studies.robustness import read_judged
 
 LONGEST_S = 20.0

@@ -13,20 +13,20 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from annelid.analysis.agreement import run_series
 from annelid.body.worm import WormBody
 from annelid.config import RunConfig, load_config
 from annelid.errors import AnnelidError, ConfigError
-from annelid.experiment.identify.base import Data
-from annelid.experiment.identify.intervals import confused, replicates
-from annelid.experiment.identify.kinds.load_frame import FrameTest
-from annelid.experiment.identify.kinds.ring_down import RingDown, first_root
-from annelid.experiment.identify.kinds.tensile import Tensile, bending_secant, stress
-from annelid.experiment.identify.noise import Noise, estimated
-from annelid.experiment.identify.report import Identified, identify, tables, write_identified
-from annelid.experiment.identify.simulations import Simulations
-from annelid.experiment.identify.study import ROBOT, load_identify_study
 from annelid.experiment.spread import read_spread
+from annelid_lab.calibration.base import Data
+from annelid_lab.calibration.intervals import confused, replicates
+from annelid_lab.calibration.kinds.load_frame import FrameTest
+from annelid_lab.calibration.kinds.ring_down import RingDown, first_root
+from annelid_lab.calibration.kinds.tensile import Tensile, bending_secant, stress
+from annelid_lab.calibration.noise import Noise, estimated
+from annelid_lab.calibration.report import Identified, identify, tables, write_identified
+from annelid_lab.calibration.simulations import Simulations
+from annelid_lab.calibration.study import ROBOT, load_identify_study
+from annelid_lab.logs.agreement import run_series
 
 TUBE: dict[str, Any] = {
     "kind": "tensile",

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from annelid.analysis import DetectionScore
 from annelid.control.open_loop import TimedWave
 from annelid.control.pressure import PressureSns
 from annelid.control.sns import Sns
@@ -26,6 +25,7 @@ from annelid_studies.slip import (
     write_readings,
     write_scores,
 )
+from annelid_studies.slip_detector import DetectionScore
 
 
 def test_only_the_controller_differs() -> None:

@@ -26,7 +26,7 @@ def test_a_picture_that_fails_does_not_cost_the_others(
     assert len(said) == 1
     assert "figure7.png not drawn" in said[0]
     assert os.strerror(errno.ENOSPC) in said[0]
-    assert f"annelid plot {tmp_path}" in said[0]
+    assert f"annelid draw {tmp_path}" in said[0]
     assert [path.name for path in tmp_path.iterdir()] == ["frame.png"]
 
 
@@ -45,4 +45,4 @@ def test_one_reason_is_said_once_for_all_its_pictures(
     assert list(drawn) == []
     assert len(said) == 1
     assert "frame.png and video.mp4 not drawn: no back-end" in said[0]
-    assert f"--time 1.5 and annelid render {tmp_path} --video {tmp_path / 'video.mp4'}" in said[0]
+    assert f"--time 1.5 and annelid draw {tmp_path} --video {tmp_path / 'video.mp4'}" in said[0]

@@ -11,18 +11,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from annelid.analysis.agreement import compare_with_log, run_series
-from annelid.analysis.measured import LogMap, read_measured
 from annelid.config import load_config, preset_names
 from annelid.draw.scene import Skeleton, upright
 from annelid.errors import ConfigError, RunFileError
 from annelid.live.living import LivingWorm, Moment, Reel, knobs_of, reel_of
-from annelid.live.panel import MOST_SAMPLES, measured_plots, plots_of
+from annelid.live.panel import MOST_SAMPLES, plots_of
 from annelid.live.picture import REACH_M, Painter, ring_colors, spring_colors, struck
 from annelid.live.player import Player, player_of
 from annelid.live.things import triangles
 from annelid.simulation.runfile import Run
 from annelid.simulation.worm import compile_worm
+from annelid_lab.logs.agreement import compare_with_log, run_series
+from annelid_lab.logs.measured import LogMap, read_measured
+from annelid_lab.logs.report import measured_plots
 
 FRAME_S = 0.04
 

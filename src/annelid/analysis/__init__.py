@@ -13,7 +13,7 @@ from annelid.analysis.summary import Summary, summary
 from annelid.lazy import lazy
 
 if TYPE_CHECKING:
-    from annelid.analysis.detector import Detection, DetectionScore, detect_slip, precision_recall, score_detections
+    from annelid.analysis.comparison import compare
     from annelid.analysis.gait import SlipCost, slip_cost
     from annelid.analysis.interval import CONFIDENCE, Estimate, mean_and_interval
     from annelid.analysis.paper import (
@@ -29,11 +29,19 @@ if TYPE_CHECKING:
         deformation,
         distance_from_ring_m,
         nearest_frame,
+        nearest_time,
         plane_means,
         rhombus_diagonals,
         rhombus_plane,
     )
-    from annelid.analysis.rhythm import CONTRACTED, DESIGN_INTERVAL_S, SHORTEST_S, contractions, segment_activation
+    from annelid.analysis.rhythm import (
+        CONTRACTED,
+        DESIGN_INTERVAL_S,
+        SHORTEST_S,
+        contractions,
+        segment_activation,
+        stretches,
+    )
     from annelid.analysis.summary import end_difference, interior_deficit, middle_deficit
     from annelid.analysis.track import Track, forward_position, track_of, turn_of
 
@@ -47,8 +55,6 @@ __all__ = [
     "ROBOT_ELONGATION_M",
     "SHORTEST_S",
     "Deformation",
-    "Detection",
-    "DetectionScore",
     "Estimate",
     "Gait",
     "Passage",
@@ -57,9 +63,9 @@ __all__ = [
     "Summary",
     "Track",
     "actuated",
+    "compare",
     "contractions",
     "deformation",
-    "detect_slip",
     "distance_from_ring_m",
     "end_difference",
     "forward_position",
@@ -69,15 +75,15 @@ __all__ = [
     "mean_and_interval",
     "middle_deficit",
     "nearest_frame",
+    "nearest_time",
     "passage_of",
     "plane_means",
-    "precision_recall",
     "rhombus_diagonals",
     "rhombus_plane",
     "rhythm_score",
-    "score_detections",
     "segment_activation",
     "slip_cost",
+    "stretches",
     "summary",
     "track_of",
     "turn_of",

@@ -66,7 +66,16 @@ def nearest_frame(run: Run, time_s: float) -> int:
 
 
 def nearest_time(run: Run, times_s: Array, time_s: float) -> int:
-    """Returns the index of the recorded time nearest to a wanted one, as `nearest_frame` does."""
+    """Returns the index of the recorded time nearest to a wanted one, as `nearest_frame` does.
+
+    Args:
+        run: The run, which an error names.
+        times_s: Recorded times, s.
+        time_s: The wanted time, s.
+
+    Raises:
+        RunFileError: The run has no such time.
+    """
     margin = float(np.diff(times_s).max()) if len(times_s) > 1 else 0.0
     if not times_s[0] - margin <= time_s <= times_s[-1] + margin:
         raise RunFileError(

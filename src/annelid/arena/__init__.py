@@ -1,10 +1,33 @@
 """Where the worm crawls: attaches to any body's spec.
 
 A kind of ground (`kinds`) says where its surface lies; what touches it, and what is seen of it, follows from that. The
-names below are what a kind of your own is written with.
+names below are what a kind of your own is written with; they are loaded on first use.
 """
 
-from annelid.arena.kinds.floor import Floor, Ground
-from annelid.arena.surface import Implicit, Level, Nearest, Plane, Surface
+from __future__ import annotations
 
-__all__ = ["Floor", "Ground", "Implicit", "Level", "Nearest", "Plane", "Surface"]
+from typing import TYPE_CHECKING
+
+from annelid.lazy import lazy
+
+if TYPE_CHECKING:
+    from annelid.arena.grammar import ROBOT
+    from annelid.arena.kinds.floor import Floor, Ground
+    from annelid.arena.mjcf import names_in, read_mjcf, stated_in, validator
+    from annelid.arena.surface import Implicit, Level, Nearest, Plane, Surface
+
+__all__ = [
+    "ROBOT",
+    "Floor",
+    "Ground",
+    "Implicit",
+    "Level",
+    "Nearest",
+    "Plane",
+    "Surface",
+    "names_in",
+    "read_mjcf",
+    "stated_in",
+    "validator",
+]
+__getattr__, __dir__ = lazy(__name__)

@@ -49,6 +49,10 @@ _FOLDERS = ("meshdir", "assetdir")
 def read_mjcf(path: Path, grammar: Grammar = SCENE) -> str:
     """Reads an MJCF file and the files that it names, beside it or below its folder, as one text without references.
 
+    Args:
+        path: The file.
+        grammar: What it may contain.
+
     Raises:
         ConfigError: A file cannot be read, lies elsewhere or is too large, or the text is not what `checked` allows.
     """
@@ -96,7 +100,14 @@ def checked(text: str, grammar: Grammar = SCENE) -> str:
 
 
 def validator(grammar: Grammar) -> Callable[[str], str]:
-    """Returns `checked` for a field of a configuration, which raises ValueError."""
+    """Returns `checked` for a field of a configuration, which raises ValueError.
+
+    Args:
+        grammar: What the text may contain.
+
+    Raises:
+        ValueError: By what is returned, where the text is refused.
+    """
 
     def valid(text: str) -> str:
         try:
@@ -108,13 +119,26 @@ def validator(grammar: Grammar) -> Callable[[str], str]:
 
 
 def names_in(text: str, grammar: Grammar, section: str) -> tuple[str, ...]:
-    """Returns the names of the elements of a section (``actuator``) of a text that is `checked`, in its order."""
+    """Returns the names of the elements of a section (``actuator``) of a text that is `checked`, in its order.
+
+    Args:
+        text: The text.
+        grammar: What it may contain.
+        section: Name of the section.
+    """
     root = _parsed(text, grammar)
     return tuple(element.attrib["name"] for element in root.iterfind(f"{section}/*") if "name" in element.attrib)
 
 
 def stated_in(text: str, grammar: Grammar, section: str, name: str) -> str | None:
-    """Returns what a text that is `checked` states last as an attribute of a section; None where it does not."""
+    """Returns what a text that is `checked` states last as an attribute of a section; None where it does not.
+
+    Args:
+        text: The text.
+        grammar: What it may contain.
+        section: Name of the section.
+        name: Name of the attribute.
+    """
     return next(
         (one.attrib[name] for one in reversed(_parsed(text, grammar).findall(section)) if name in one.attrib), None
     )

@@ -14,13 +14,15 @@ from annelid.engine import refuse_mixed_engine
 from annelid.lazy import lazy
 
 if TYPE_CHECKING:
+    from annelid.body.actuation import crossing_site, ring_names, stretch_sensors
     from annelid.body.actuators import ActuatorKind
     from annelid.body.actuators.muscle import Rings, muscle_force
-    from annelid.body.actuators.servo import ServoRings, motor_power_W
+    from annelid.body.actuators.servo import ServoRings, motor_power_W, wrap_factors
     from annelid.body.assemble import build_spec, compile_spec, mesh_of
+    from annelid.body.estimates import bearable_force_N, rhombus_of
     from annelid.body.formulations import FormulationKind
     from annelid.body.formulations.rods import Rods
-    from annelid.body.worm import WormBody
+    from annelid.body.worm import Mesh, WormBody
 
 # Every use of the engine begins here, and a mixed one fails with errors that explain nothing.
 refuse_mixed_engine()
@@ -28,15 +30,22 @@ refuse_mixed_engine()
 __all__ = [
     "ActuatorKind",
     "FormulationKind",
+    "Mesh",
     "Rings",
     "Rods",
     "ServoRings",
     "WormBody",
+    "bearable_force_N",
     "build_spec",
     "compile_spec",
+    "crossing_site",
     "mesh_of",
     "motor_power_W",
     "muscle_force",
+    "rhombus_of",
+    "ring_names",
+    "stretch_sensors",
+    "wrap_factors",
 ]
 
 __getattr__, __dir__ = lazy(__name__)

@@ -37,7 +37,12 @@ def mark_crossing(pin: mujoco.MjsBody, name: str, radius_m: float, mass_kg: floa
 
 
 def ring_names(n_segments: int, rings: ActuatorKind) -> list[str]:
-    """Names of the ring actuators: segment by segment, left before right."""
+    """Names of the ring actuators: segment by segment, left before right.
+
+    Args:
+        n_segments: Segments of the worm.
+        rings: Its ring actuators.
+    """
     sides = ("",) if rings.layout == "whole" else ("_left", "_right")
     return [f"ring_{segment}{side}" for segment in range(n_segments) for side in sides]
 
@@ -63,7 +68,12 @@ def add_springs(spec: mujoco.MjSpec, geometry: MeshGeometry, springs: Springs) -
 
 
 def stretch_sensors(geometry: MeshGeometry, springs: Springs) -> Indices:
-    """Returns the springs with a sensor, ``(n_segments, n_sensors)``: all round a ring, or the left and the right."""
+    """Returns the springs with a sensor, ``(n_segments, n_sensors)``: all round a ring, or the left and the right.
+
+    Args:
+        geometry: The mesh.
+        springs: Its springs.
+    """
     every = geometry.sensor_springs
     if springs.sensors == "all":
         return every

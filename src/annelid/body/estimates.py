@@ -81,6 +81,10 @@ def bearable_force_N(body: WormBody, share: float = 1 / 3) -> float:
     """Estimates the tension at which a ring closes to a share of the rhombi's opening at rest, N: see the module.
 
     Segments must be alike, as `WormBody.groups` makes them.
+
+    Args:
+        body: The worm.
+        share: Opening of the rhombi over that at rest.
     """
     shape, springs = rhombus_of(body), body.springs
     rest, opening = shape.opening_rad, share * shape.opening_rad

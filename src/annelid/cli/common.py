@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import webbrowser
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from annelid.config import RunConfig
     from annelid.experiment.check import Check
     from annelid.experiment.store import Store
+    from annelid.live import Plot
     from annelid.simulation.runfile import Run
 
 FIRST_PRESET, RIGID_PRESET = "riddle2023-fast", "riddle2023-rods"
@@ -57,7 +59,7 @@ ArenaName = Annotated[
     typer.Option(
         "--arena",
         metavar="ARENA|FILE.toml|FILE.xml",
-        help="Put the 3D worm elsewhere: a name of `annelid arenas`, a TOML file, or a scene of your own as MJCF"
+        help="Put the 3D worm elsewhere: a name of `annelid list arenas`, a TOML file, or a scene of your own as MJCF"
         " [default: where the preset is]",
     ),
 ]
@@ -85,6 +87,15 @@ def kept_runs(output: Path, *, jobs: int | None, quiet: bool, scheduler: str | N
     """Gives the store of a study's runs, ``runs`` in its folder, with its workers and its progress display.
 
     Other writers are kept out of the folder.
+
+    Args:
+        output: Folder of the study's results.
+        jobs: Runs at a time, or None.
+        scheduler: Address of a Dask scheduler whose workers compute; None for processes of this machine.
+        quiet: Whether progress is not shown.
+
+    Raises:
+        BadParameter: Both a scheduler and ``jobs`` are given.
     """
     from annelid.experiment import executors
     from annelid.experiment.progress import study_progress
@@ -100,7 +111,16 @@ def kept_runs(output: Path, *, jobs: int | None, quiet: bool, scheduler: str | N
 
 @contextmanager
 def going_on(folder: Path, *further: str, kept: str = "finished runs are kept") -> Iterator[None]:
-    """Says on Ctrl-C what is kept in a folder, and the command that goes on: the one given, with further words."""
+    """Says on Ctrl-C what is kept in a folder, and the command that goes on: the one given, with further words.
+
+    Args:
+        folder: The folder.
+        further: Words that the command which goes on needs beside those that were given.
+        kept: What is kept.
+
+    Raises:
+        Exit: On Ctrl-C.
+    """
     try:
         yield
     except KeyboardInterrupt:
@@ -109,7 +129,12 @@ def going_on(folder: Path, *further: str, kept: str = "finished runs are kept") 
 
 
 def overrides_of(assignments: list[str] | None, **options: Any) -> dict[str, Any]:
-    """Joins the assignments of ``--set`` and the options that were given, which win, as values by dotted path."""
+    """Joins the assignments of ``--set`` and the options that were given, which win, as values by dotted path.
+
+    Args:
+        assignments: As given, each ``field=value``.
+        options: Values of options by their fields; None where one was not given.
+    """
     from annelid.config import parse_assignments
 
     given = {field: value for field, value in options.items() if value is not None}
@@ -128,6 +153,14 @@ def config_of(
 
     The worm of the first run is fitted to three segments, its own mesh and its own step: without a name, an option that
     changes these takes the worm with rigid crossings instead, and says so.
+
+    Args:
+        preset: A preset or file, or None.
+        overrides: Values by dotted path.
+        segments: Number of segments.
+        fidelity: Level of fidelity.
+        arena: Where the worm is put.
+        uncertainty: Monte Carlo samples that the command makes, or None.
     """
     from annelid.config import load_config
 
@@ -146,7 +179,16 @@ def config_of(
 
 
 def refuse_existing(path: Path, force: bool, option: str = "-o") -> None:
-    """Raises `RunFileError` where an output file exists without --force, or cannot be written; an option names it."""
+    """Raises `RunFileError` where an output file exists without --force, or cannot be written; an option names it.
+
+    Args:
+        path: The file.
+        force: Whether it may be replaced.
+        option: Option that names the file, for the message.
+
+    Raises:
+        RunFileError: It exists, or cannot be written.
+    """
     if path.is_dir():
         raise RunFileError(f"{path} is a folder: name a file")
     if path.exists() and not force:
@@ -166,6 +208,12 @@ def print_results(
     """Prints the tables and sentences of a study unless it is to be quiet, and the paths of its files.
 
     With --json these are the paths and what the files hold, and further results by name.
+
+    Args:
+        paths: The files.
+        tables: Tables and sentences.
+        quiet: Whether only the paths are printed.
+        results: Further results by name, for --json.
     """
     from annelid.terminal import Console
 
@@ -197,6 +245,11 @@ def print_run(run: Run, *, quiet: bool = False, check: Check | None = None) -> N
     """Prints the numbers of a run unless it is to be quiet, those to compare with beside them, and what follows.
 
     A check adds how far each number moves, and its sentence at the end.
+
+    Args:
+        run: The run.
+        quiet: Whether nothing is printed.
+        check: What finer runs have found.
     """
     from annelid.analysis import gait, summary
     from annelid.draw.table import closing_sentence, summary_table
@@ -215,3 +268,37 @@ def print_run(run: Run, *, quiet: bool = False, check: Check | None = None) -> N
         typer.echo(closing)
     if check is not None:
         typer.echo(check.sentence)
+
+
+def play(
+    worm: RunConfig | Run,
+    *,
+    host: str = "127.0.0.1",
+    port: int | None = None,
+    speed: float = 1.0,
+    open_browser: bool = True,
+    plots: Mapping[str, Plot] | None = None,
+) -> None:
+    """Shows a worm or a run in the browser until Ctrl-C.
+
+    Args:
+        worm: A configuration to run, or a run to play.
+        host: Address to listen on.
+        port: Port, 0 for any that is free; None for the usual one or the next free.
+        speed: Simulated seconds a second at the start.
+        open_browser: Whether to open the page.
+        plots: Further plots beside the worm, by their names.
+    """
+    from annelid.live.server import free_port, warning_of
+    from annelid.live.show import Show
+
+    if (warning := warning_of(host)) is not None:
+        complain(f"warning: {warning}")
+    with Show(worm, host=host, port=free_port(host, port), speed=speed, plots=plots) as show:
+        typer.echo(f"{show.address}  (Ctrl-C ends)")
+        if open_browser:
+            webbrowser.open(show.address)
+        try:
+            show.run()
+        except KeyboardInterrupt:
+            typer.echo("")

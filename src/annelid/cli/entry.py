@@ -7,7 +7,7 @@ import shlex
 import signal
 import sys
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack, suppress
 from contextvars import ContextVar
 from io import TextIOWrapper
@@ -38,12 +38,38 @@ EXIT_INTERRUPTED = 130
 """Ended by Ctrl-C, SIGTERM or SIGHUP; what was finished is kept."""
 
 
+PANELS = ("Make", "See", "Vary", "Exchange", "Robot", "Studies", "Help")
+"""Headings of the help, below which the commands stand in the order in which they join."""
+_OLD: Mapping[str, tuple[str, ...]] = {
+    "build": ("export", "--to", "mjcf"),
+    "experiment": ("study",),
+    **dict.fromkeys(("plot", "render"), ("draw",)),
+    **{name: ("list", name) for name in ("presets", "arenas", "runs")},
+    **{name: ("study", name) for name in ("limit-cycle", "bench", "robustness", "challenge", "gallery")},
+}
+"""What commands of before are now; they go on for one release."""
+WIDEST = 200
+"""Characters of a command's line in the help, which goes on in the next line and is never cut."""
+
 _locks: ContextVar[ExitStack] = ContextVar("_locks")
 _typed: ContextVar[tuple[str, ...]] = ContextVar("_typed", default=())
 """The command and the words after it, as the user gave them."""
 
 
-class _Sentences(TyperGroup):
+class _Panels(TyperGroup):
+    """Lists its commands by panel, no line of them cut."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Writes the panels that have a command; what is in none stands below "Commands"."""
+        known = [(name, self.commands[name]) for name in self.list_commands(ctx) if not self.commands[name].hidden]
+        for panel in (*PANELS, "Commands"):
+            rows = [(name, one.get_short_help_str(WIDEST)) for name, one in known if _panel_of(one) == panel]
+            if rows:
+                with formatter.section(panel):
+                    formatter.write_dl(rows)
+
+
+class _Sentences(_Panels):
     """Ends every error a user can act on with one sentence and an exit code, never with a traceback."""
 
     def main(self, *args: Any, **options: Any) -> Any:
@@ -61,6 +87,13 @@ class _Sentences(TyperGroup):
             complain(f"cannot print: {error.strerror or error}")
             sys.exit(EXIT_USAGE)
 
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Finds a command, by its old name with a hint."""
+        if (now := _OLD.get(args[0])) is not None:
+            complain(f"hint: annelid {args[0]} is now annelid {' '.join(now)}; the old name goes with the next release")
+            args = [*now, *args[1:]]
+        return super().resolve_command(ctx, args)
+
     def invoke(self, ctx: Any) -> Any:
         """Runs the command."""
         try:
@@ -74,6 +107,10 @@ class _Sentences(TyperGroup):
             sentence, code = ending
             complain(sentence)
             raise typer.Exit(code) from None
+
+
+def _panel_of(command: Any) -> str:
+    return command.rich_help_panel if isinstance(command.rich_help_panel, str) else "Commands"
 
 
 def _ending(error: BaseException) -> tuple[object, int] | None:
@@ -129,17 +166,6 @@ class Command(TyperCommand):
         return rest
 
 
-experiments = typer.Typer(no_args_is_help=True, help="Do an experiment on a worm.")
-
-
-def study(name: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Returns a decorator that makes a function the command `annelid experiment NAME`, its parameters as Typer's.
-
-    The command has the option ``--json`` beside them.
-    """
-    return lambda command: experiments.command(name, cls=Command)(with_json(command))
-
-
 app = typer.Typer(
     cls=_Sentences,
     no_args_is_help=True,
@@ -147,6 +173,41 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
 )
+lists = typer.Typer(cls=_Panels, no_args_is_help=True, help="List presets, arenas or runs.")
+app.add_typer(lists, name="list", rich_help_panel="Make")
+studies = typer.Typer(cls=_Panels, no_args_is_help=True, help="Do one of the studies that the pages report.")
+app.add_typer(studies, name="study", rich_help_panel="Studies")
+
+Function = Callable[..., None]
+
+
+def command(name: str, panel: str, *, as_json: bool = True) -> Callable[[Function], Function]:
+    """Returns a decorator that makes a function the command `annelid NAME`, its parameters as Typer's.
+
+    Args:
+        name: Name of the command.
+        panel: Heading of the help that it stands under, one of `PANELS`; empty for a command that the help leaves out.
+        as_json: Whether it has the option ``--json`` beside its parameters.
+    """
+    return _joins(app, name, as_json=as_json, hidden=not panel, rich_help_panel=panel)
+
+
+def study(name: str) -> Callable[[Function], Function]:
+    """Returns a decorator that makes a function the command `annelid study NAME`, as `command` does."""
+    return _joins(studies, name)
+
+
+def listing(name: str) -> Callable[[Function], Function]:
+    """Returns a decorator that makes a function the command `annelid list NAME`, as `command` does."""
+    return _joins(lists, name)
+
+
+def _joins(group: typer.Typer, name: str, *, as_json: bool = True, **options: Any) -> Callable[[Function], Function]:
+    def join(function: Function) -> Function:
+        group.command(name, cls=Command, **options)(with_json(function) if as_json else function)
+        return function
+
+    return join
 
 
 def main() -> None:
@@ -200,9 +261,8 @@ def _start(
     annelid run                        run the paper's worm as rods: a few seconds
     annelid run riddle2023             run it as the paper built it: about a minute
     annelid run riddle2022-planar      run the planar worm: a few seconds
-    annelid paper                      reproduce and examine the whole paper: about 40 minutes
-    annelid bench                      speed and error side by side: up to half an hour
-    annelid presets                    what else there is
+    annelid list presets               what else there is
+    annelid study paper                reproduce and examine the whole paper: about 40 minutes
     annelid doctor                     is everything in place?
 
     Exit codes: 0 done, 2 refused, 3 stopped by a guard, 4 runs failed, 5 all runs failed, 130 interrupted, 1 anything
@@ -214,6 +274,15 @@ def end_study(n_runs: int, failed: int, reasons: object, *, stopped: int = 0) ->
     """Ends a study's command with a sentence and an exit code where runs failed, or were stopped by a guard.
 
     The sentence names where the reasons can be read.
+
+    Args:
+        n_runs: Runs of the study.
+        failed: Of them, those that could not be computed.
+        reasons: The file that has the reasons.
+        stopped: Of them, those that a guard stopped.
+
+    Raises:
+        Exit: Runs failed or were stopped.
     """
     if counts := [f"{n} {what}" for n, what in ((failed, "failed"), (stopped, "were stopped by a guard")) if n]:
         complain(f"of {n_runs} runs {' and '.join(counts)}: the reasons are in {reasons}")
@@ -226,7 +295,12 @@ def typed_command(*further: str) -> str:
 
 
 def lock(folder: Path, *, new: bool = False) -> None:
-    """Keeps other writers out of a folder, as `annelid.simulation.lock.locked` does, until the command ends."""
+    """Keeps other writers out of a folder, as `annelid.simulation.lock.locked` does, until the command ends.
+
+    Args:
+        folder: The folder.
+        new: Whether it must not be there yet.
+    """
     from annelid.simulation.lock import locked
 
     _locks.get().enter_context(locked(folder, new=new))

@@ -60,7 +60,15 @@ def wants_json() -> bool:
 
 
 def refuse_json(given: bool, what: str) -> None:
-    """Refuses ``--json`` beside options that print something else."""
+    """Refuses ``--json`` beside options that print something else.
+
+    Args:
+        given: Whether the other option was given.
+        what: Name of that option.
+
+    Raises:
+        BadParameter: Both were given.
+    """
     if given and wants_json():
         raise typer.BadParameter(f"--json prints the result as JSON: it does not go with {what}")
 
@@ -74,7 +82,12 @@ def give(document: Any) -> bool:
 
 
 def give_files(paths: Iterable[Path], results: Mapping[str, Any] | None = None) -> bool:
-    """Adds the paths of files that were written, the versions, and results by name to the document, as `give` does."""
+    """Adds the paths of files that were written, the versions, and results by name to the document, as `give` does.
+
+    Args:
+        paths: The files.
+        results: Results by name.
+    """
     if (documents := _documents.get()) is None:
         return False
     document = documents[0] if documents else {"files": [], "results": {}}

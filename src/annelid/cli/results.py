@@ -1,8 +1,7 @@
-"""The commands on finished runs: `show`, `compare`, `plot`, `render`, `view`, `export` and `cite`."""
+"""The commands on finished runs: `show`, `draw`, `view`, `export` and `cite`."""
 
 from __future__ import annotations
 
-import webbrowser
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -19,11 +18,12 @@ from annelid.cli.common import (
     config_of,
     numbers_of,
     overrides_of,
+    play,
     print_paths,
     print_run,
     refuse_existing,
 )
-from annelid.cli.entry import complain, lock
+from annelid.cli.entry import command, lock
 from annelid.cli.result import give, refuse_json, wants_json
 from annelid.errors import ConfigError, RunFileError, suggest
 
@@ -32,7 +32,8 @@ if TYPE_CHECKING:
     from annelid.simulation.runfile import Run
 
 
-def show(
+@command("show", "See")
+def show_command(
     run: RunPath,
     verify: Annotated[
         bool, typer.Option("--verify", help="Only say whether every byte of the file is as it was when the run ended.")
@@ -65,144 +66,21 @@ def show(
         typer.echo(opened.message)
 
 
-def compare_command(
-    runs: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar="RUN RUN..",
-            help="Folders of runs, or their run.nc; differences are to the first. With --map: a run and a table.",
-        ),
-    ],
-    log_map: Annotated[
-        Path | None,
-        typer.Option("--map", metavar="MAP.toml", help="Compare with measured data: what the table's columns are."),
-    ] = None,
-    from_time: Annotated[
-        float, typer.Option(help="With --map: time of the run before which nothing is compared, s.")
-    ] = 0.0,
-    output: Annotated[
-        Path | None,
-        typer.Option("--output", "-o", help="Folder for the figures and comparison.json  [default: only print]"),
-    ] = None,
-    potentials: Annotated[bool, typer.Option("--potentials", help="Draw the potentials of the neurons too.")] = False,
-    force: Force = False,
-) -> None:
-    """Lay runs side by side: numbers, differences, figures.
-
-    Prints the numbers of every run with their differences to the first, and the fields in which the configurations
-    differ. What a run lacks is a dash, so worms of any kinds can be compared. With -o it draws all runs into one
-    figure each: lengths.png, travel.png, and potentials.png with --potentials.
-
-    \b
-    annelid compare runs/riddle2023-rods-001 runs/riddle2023-rods-002
-    annelid compare runs/riddle2023-rods-001 runs/riddle2022-planar-001 -o comparison
-    annelid compare runs/* --json | jq .numbers.period_s
-    annelid compare runs/wang-001 robot.csv --map robot.toml -o robot
-
-    With --map the second file is a measured log: CSV, Parquet, MATLAB, netCDF, or the points of a video tracker.
-    Both are aligned in time, and every signal's error, amplitude, phase and duty are printed; -o adds
-    agreement.json and agreement.png. docs/how_to/measured_data.md describes map and numbers.
-    """
-    if log_map is not None:
-        _compare_measured(runs, log_map, from_time, output, force=force)
-        return
-    from annelid.analysis.comparison import compare
-    from annelid.draw.figures.comparison import lengths_figure, potentials_figure, travel_figure
-    from annelid.draw.table import comparison_table, fields_table
-    from annelid.output import write_json
-    from annelid.simulation.runfile import open_run
-    from annelid.terminal import Console
-
-    if len(runs) < 2:
-        raise typer.BadParameter("name at least two runs to compare")
-    if potentials and output is None:
-        raise typer.BadParameter("--potentials draws a figure, so it needs a folder: -o FOLDER")
-    figures = {"lengths.png": lengths_figure, "travel.png": travel_figure}
-    if potentials:
-        figures["potentials.png"] = potentials_figure
-    if output is not None:
-        lock(output)
-        for name in ("comparison.json", *figures):
-            refuse_existing(output / name, force)
-    opened = [open_run(run) for run in runs]
-    comparison = compare(opened)
-    if not give(comparison.to_dict()):
-        Console().print(comparison_table(comparison))
-        Console().print(fields_table(comparison) if comparison.fields else "the configurations are the same")
-    if output is None:
-        return
-    written = [write_json(output / "comparison.json", comparison.to_dict())]
-    for name, draw in figures.items():
-        try:
-            written.append(draw(opened, comparison.labels, output / name))
-        except RunFileError as error:
-            complain(f"{name} not drawn: {error}")
-    print_paths(written)
-
-
-def _compare_measured(files: list[Path], log_map: Path, from_s: float, output: Path | None, *, force: bool) -> None:
-    from annelid.analysis.agreement import compare_with_log
-    from annelid.analysis.measured import read_map, read_measured
-    from annelid.draw.figures.comparison import agreement_figure
-    from annelid.draw.table import agreement_table
-    from annelid.output import write_json
-    from annelid.simulation.runfile import open_run
-    from annelid.terminal import Console
-
-    if len(files) != 2:
-        raise typer.BadParameter("--map compares one run with one measured table: name both")
-    if output is not None:
-        lock(output)
-        for name in ("agreement.json", "agreement.png"):
-            refuse_existing(output / name, force)
-    found = compare_with_log(open_run(files[0]), read_measured(files[1], read_map(log_map)), from_s=from_s)
-    if not give(found.to_dict()):
-        Console().print(agreement_table(found))
-    for note in found.notes:
-        complain(f"note: {note}")
-    if output is not None:
-        print_paths([write_json(output / "agreement.json", found.to_dict())])
-        print_paths([agreement_figure(found, output / "agreement")])
-
-
-def plot(
+@command("draw", "See")
+def draw_command(
     run: RunPath,
-    output: Annotated[
-        Path | None,
-        typer.Option("--output", "-o", help="Picture to write: .png, .pdf, .svg  [default: FIGURE.png in the run]"),
-    ] = None,
     figure: Annotated[
-        str,
+        str | None,
         typer.Option(
             metavar="FIGURE",
-            help="figure7: potentials and lengths; track: the path, seen from above; network: neurons and synapses.",
+            help="figure7: potentials and lengths; track: the path, seen from above; network: neurons and synapses."
+            "  [default: figure7, unless a frame, a strip or a video is drawn]",
         ),
-    ] = "figure7",
-    force: Force = False,
-) -> None:
-    """Draw potentials and lengths, the track, or the network.
-
-    The counterpart of the paper's figure 7; or where the worm crawled: the paths of its middle and of its front, its
-    outline at several times, and what stood in the way; or the network of its controller, with a key.
-
-    \b
-    annelid plot runs/riddle2023-001 -o figure7.pdf
-    annelid plot runs/riddle2025-001 --figure track
-    annelid plot runs/riddle2023-001 --figure network -o network.svg
-    """
-    from annelid.draw.notebook import plot as drawn
-    from annelid.draw.plots import plot_path
-
-    if output is not None:
-        refuse_existing(plot_path(output), force)
-    print_paths([drawn(run, output, figure=figure).path])
-
-
-def render(
-    run: RunPath,
+    ] = None,
     at: Annotated[float | None, typer.Option("--time", help="Draw one frame at this time, s.")] = None,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="Frame to write: .png, .jpg  [default: frame.png in the run]")
+        Path | None,
+        typer.Option("--output", "-o", help="Figure or frame to write  [default: FIGURE.png or frame.png in the run]"),
     ] = None,
     strip: Annotated[
         Path | None, typer.Option(help="Draw the last cycle as frames side by side: .png, .pdf, .svg")
@@ -219,29 +97,41 @@ def render(
     ] = None,
     force: Force = False,
 ) -> None:
-    """Draw a frame, a strip of frames or a video of a run.
+    """Draw a run: a figure, a frame, a strip of frames or a video.
 
-    All come from the recorded postures: later, and on any machine. Of a 3D worm they carry a legend, the time, and a
-    scale bar that is right at the distance of the worm's middle.
+    Figures are .png, .pdf or .svg: the counterpart of the paper's figure 7; the paths of the worm's middle and front
+    with its outline at several times; or the network of its controller, with a key. Frames come from the recorded
+    postures: later, and on any machine. Of a 3D worm they carry a legend, the time, and a scale bar that is right at
+    the distance of the worm's middle.
 
     \b
-    annelid render runs/riddle2023-001 --time 1.5 -o frame.png
-    annelid render runs/riddle2023-001 --video slow.mp4 --speed 0.25
-    annelid render runs/riddle2023-001 --time 1.5 --camera side -o side.png
-    annelid render runs/riddle2023-001 --strip cycle.pdf --background white
+    annelid draw runs/riddle2023-001 -o figure7.pdf
+    annelid draw runs/riddle2025-001 --figure track
+    annelid draw runs/riddle2023-001 --figure network -o network.svg
+    annelid draw runs/riddle2023-001 --time 1.5 --camera side -o side.png
+    annelid draw runs/riddle2023-001 --video slow.mp4 --speed 0.25
+    annelid draw runs/riddle2023-001 --strip cycle.pdf --background white
     """
     from annelid.draw.gallery import VIDEO_TASK, task_bar
+    from annelid.draw.notebook import plot
+    from annelid.draw.plots import plot_path
     from annelid.draw.render import render_frame, render_strip, render_video
     from annelid.simulation.runfile import open_run
 
-    if video is None and at is None and strip is None:
-        raise typer.BadParameter("say what to draw: --time SECONDS for a frame, --strip FILE, --video FILE")
-    if output is not None and at is None:
-        raise typer.BadParameter("-o names the frame, so it needs --time SECONDS as well")
+    if figure is not None and at is not None and output is not None:
+        raise typer.BadParameter("-o names one picture: draw --figure and --time by two commands")
+    if figure is None and (at, strip, video) == (None, None, None):
+        figure = "figure7"
+    if output is not None and figure is None and at is None:
+        raise typer.BadParameter("-o names the figure or the frame: it needs --figure FIGURE or --time SECONDS as well")
     opened = open_run(run)
+    if figure is not None and output is not None:
+        output = plot_path(output)
     for target in (output, strip, video):
         if target is not None:
             refuse_existing(target, force)
+    if figure is not None:
+        print_paths([plot(opened, output, figure=figure).path])
     frame = opened.path.parent / "frame.png" if output is None else output
     if at is not None:
         print_paths([render_frame(opened, at, frame, camera=camera, background=background)])
@@ -253,6 +143,7 @@ def render(
         print_paths([video])
 
 
+@command("view", "See", as_json=False)
 def view_command(
     source: Annotated[
         str | None,
@@ -277,12 +168,6 @@ def view_command(
     port: Annotated[
         int | None, typer.Option(min=0, max=65535, help="Port; 0 for any that is free  [default: the first from 8080]")
     ] = None,
-    measured: Annotated[
-        Path | None, typer.Option(metavar="TABLE", help="A measured log, drawn beside a recorded run; needs --map.")
-    ] = None,
-    log_map: Annotated[
-        Path | None, typer.Option("--map", metavar="MAP.toml", help="What the columns of the measured log are.")
-    ] = None,
     force: Force = False,
 ) -> None:
     """Watch a worm in the browser as it runs, or play a run.
@@ -297,33 +182,20 @@ def view_command(
     annelid view riddle2025-adaptive --arena pipe.taper  another one, elsewhere
     annelid view --set arena.friction=0.3 --speed 0.5    changed, in slow motion
     annelid view runs/riddle2023-rods-001                a run, as it was recorded
-    annelid view runs/riddle2023-rods-001 --measured robot.csv --map robot.toml   with a robot's log beside it
+    annelid compare runs/riddle2023-rods-001 robot.csv --map robot.toml --view   with a robot's log beside it
     annelid view runs/riddle2023-rods-001 --export walk.html   as one page to send by mail
     annelid view --native                                in MuJoCo's own window
     """
     worm: RunConfig | Run
-    recorded = None
     if source and not source.endswith(".toml") and Path(source).exists():
         from annelid.simulation.runfile import open_run
 
         if (assignments, segments, fidelity, arena) != (None, None, None, None):
             raise typer.BadParameter("a run is played as it was: give no --set, --segments, --fidelity or --arena")
-        worm = recorded = open_run(source)
+        worm = open_run(source)
     else:
         preset = RIGID_PRESET if source is None else source
         worm = config_of(preset, overrides_of(assignments), segments, fidelity, arena)
-    agreement = None
-    if measured is not None or log_map is not None:
-        if measured is None or log_map is None:
-            raise typer.BadParameter("a log needs both --measured TABLE and --map MAP.toml")
-        if recorded is None or native or export is not None:
-            raise typer.BadParameter("a log is drawn beside a recorded run in the browser: name a run's folder")
-        from annelid.analysis.agreement import compare_with_log
-        from annelid.analysis.measured import read_map, read_measured
-
-        agreement = compare_with_log(recorded, read_measured(measured, read_map(log_map)))
-        for note in agreement.notes:
-            complain(f"note: {note}")
     if export is not None:
         if native:
             raise typer.BadParameter("--export writes a page: it does not go with --native")
@@ -340,23 +212,14 @@ def view_command(
 
         show_native(worm, speed=speed)
         return
-    from annelid.live.server import free_port, warning_of
-    from annelid.live.show import Show
-
-    if (warning := warning_of(host)) is not None:
-        complain(f"warning: {warning}")
-    with Show(worm, host=host, port=free_port(host, port), speed=speed, agreement=agreement) as show:
-        typer.echo(f"{show.address}  (Ctrl-C ends)")
-        if open_browser:
-            webbrowser.open(show.address)
-        try:
-            show.run()
-        except KeyboardInterrupt:
-            typer.echo("")
+    play(worm, host=host, port=port, speed=speed, open_browser=open_browser)
 
 
+@command("export", "Exchange")
 def export_command(
-    run: RunPath,
+    source: Annotated[
+        str, typer.Argument(metavar="RUN|PRESET|FILE.toml", help="A run's folder or run.nc; for mjcf also a worm.")
+    ],
     to: Annotated[str, typer.Option(metavar="FORMAT", help="csv, mat, parquet, nwb, mp4, gif, html or mjcf.")],
     output: Annotated[
         Path | None,
@@ -377,10 +240,14 @@ def export_command(
     ] = None,
     from_time: Annotated[float | None, typer.Option(metavar="SECONDS", help="From this time on, s (not mjcf).")] = None,
     to_time: Annotated[float | None, typer.Option(metavar="SECONDS", help="Up to this time, s (not mjcf).")] = None,
+    assignments: Assignments = None,
+    segments: Segments = None,
+    fidelity: FidelityLevel = None,
+    arena: ArenaName = None,
     force: Force = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress bar.")] = False,
 ) -> None:
-    """Write a run as tables, MATLAB, NWB, video, HTML or MJCF.
+    """Write a run for other programs: tables, NWB, video, HTML, MJCF.
 
     \b
     csv      a table for all signals of the same dimensions, units in the header; about.json says what the run is
@@ -388,18 +255,24 @@ def export_command(
     parquet  the same tables as csv, units in the metadata (pip install 'annelid[export]')
     nwb      Neurodata Without Borders: potentials as intracellular series, behaviour and positions beside
              (pip install 'annelid[export]')
-    mp4 gif  a video; annelid render has camera, speed and frame rate
+    mp4 gif  a video; annelid draw has camera, speed and frame rate
     html     one page that needs nothing else: numbers, figures, configuration, what to cite
-    mjcf     the model for plain MuJoCo, the last state as a keyframe
+    mjcf     the model for plain MuJoCo, the last state as a keyframe; of a worm that was not run with a keyframe rest
+             where it has servos, to be loaded before the first step: in it their cables are paid out
+
+    A network or a whole controller is written by annelid export-network.
 
     \b
     annelid export runs/riddle2023-rods-001 --to csv
     annelid export runs/riddle2023-rods-001 --to csv --signals ring_length,muscle_force -o rings.csv
     annelid export runs/riddle2023-rods-001 --to mat --every 10 --from-time 2 --to-time 4 -o two_seconds.mat
     annelid export runs/riddle2023-rods-001 --to html -o report.html
+    annelid export riddle2025 --arena pipe.s --to mjcf -o worm_in_pipe.xml
     """
+    from annelid.config import preset_names
     from annelid.draw.gallery import task_bar
     from annelid.export import Selection, find_format, selected
+    from annelid.output import with_suffix, write_text
     from annelid.simulation.lock import LOCK_NAME
     from annelid.simulation.runfile import open_run
 
@@ -410,7 +283,17 @@ def export_command(
             valid = f"takes {', '.join(sorted(kind.options))}" if kind.options else "takes the whole run"
             raise RunFileError(f"{option} has no effect on {kind.name}, which {valid}")
     kind.require()
-    opened = open_run(run)
+    if source in preset_names() or (source.endswith(".toml") and Path(source).is_file()):
+        if kind.worm is None:
+            raise RunFileError(f"{kind.name} is written of a run, not of a worm: annelid run {source} makes one")
+        target = Path(kind.default) if output is None else with_suffix(output, (kind.suffix,), kind.name)
+        refuse_existing(target, force)
+        worm = config_of(source, overrides_of(assignments), segments, fidelity, arena)
+        print_paths([write_text(target, kind.worm(worm))])
+        return
+    if (assignments, segments, fidelity, arena) != (None, None, None, None):
+        raise typer.BadParameter("a run is as it was: --set, --segments, --fidelity and --arena change a worm")
+    opened = open_run(source)
     target = kind.target(opened, output)
     if output is not None:
         if kind.many and target.suffix.lower() != kind.suffix:
@@ -427,7 +310,8 @@ def export_command(
     print_paths(written)
 
 
-def cite(
+@command("cite", "Exchange", as_json=False)
+def cite_command(
     source: Annotated[
         str | None,
         typer.Argument(

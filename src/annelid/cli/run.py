@@ -1,4 +1,4 @@
-"""The commands that run one worm: `run` and `limit-cycle`."""
+"""The command `run`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import sys
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, cast, get_args
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -16,7 +16,6 @@ from annelid.cli.common import (
     ArenaName,
     Assignments,
     FidelityLevel,
-    Force,
     Preset,
     Segments,
     config_of,
@@ -25,10 +24,9 @@ from annelid.cli.common import (
     print_paths,
     print_results,
     print_run,
-    refuse_existing,
 )
-from annelid.cli.entry import EXIT_INTERRUPTED, complain, end_study, lock, typed_command
-from annelid.cli.result import give, wants_json
+from annelid.cli.entry import EXIT_INTERRUPTED, command, complain, end_study, lock, typed_command
+from annelid.cli.result import wants_json
 from annelid.errors import ConfigError, SimulationStopped
 
 if TYPE_CHECKING:
@@ -38,6 +36,7 @@ if TYPE_CHECKING:
     from annelid.simulation.runfile import Run
 
 
+@command("run", "Make")
 def run_command(
     preset: Preset = None,
     assignments: Assignments = None,
@@ -100,7 +99,7 @@ def run_command(
     annelid run riddle2023                                   the paper's own formulation, in a minute
     annelid run riddle2023-rods --segments 4                 four segments, with rigid crossings
     annelid run --set arena.friction=0.3                     any field of any preset
-    annelid run --arena pipe.bend --set arena.radius=0.8     elsewhere: annelid arenas lists the places
+    annelid run --arena pipe.bend --set arena.radius=0.8     elsewhere: annelid list arenas lists the places
     annelid run my.toml --duration 20 --out long             your own file, your own folder
     annelid run --resume long --duration 40                  twenty seconds more
     annelid run riddle2023-rods --check                      how far its numbers depend on step and mesh
@@ -186,61 +185,6 @@ def run_command(
         end_study(len(result.runs), 0, folder / "uncertainty.json", stopped=stopped)
 
 
-def limit_cycle_command(
-    preset: Preset = None,
-    assignments: Assignments = None,
-    segments: Segments = None,
-    neuron: Annotated[
-        str, typer.Option(help="The cycle begins when this neuron's potential rises through the threshold.")
-    ] = "contraction_1",
-    threshold: Annotated[
-        float | None, typer.Option(help="Threshold, mV above rest.  [default: half the operating range]")
-    ] = None,
-    times: Annotated[
-        list[str] | None,
-        typer.Option("--time", metavar="WAY", help="continuous, located or stepped; may be repeated.  [default: all]"),
-    ] = None,
-    output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="Picture to write: .png, .pdf, .svg  [default: none]")
-    ] = None,
-    force: Force = False,
-) -> None:
-    """Find a planar worm's limit cycle, and how stable it is.
-
-    Follows the worm until its states repeat, then disturbs each state a little at a hundred points of the
-    cycle. Prints the period and the Floquet multipliers: what one cycle leaves of a deviation. All but one
-    below 1 in magnitude: the rhythm comes back by itself; the one at 1 is a shift in time, which stays.
-
-    Time is taken in three ways: continuous, for the multipliers; located, in the worm's own steps, but each
-    ended where a stretch sensor switches; and stepped, in its own steps as they are in a run. The picture
-    shows the phase response too: by how much a kick of a neuron, at each phase, advances the rhythm.
-    Takes about ten seconds for 3 segments, twenty for 6; default preset: riddle2022-planar.
-
-    \b
-    annelid limit-cycle riddle2022-planar --segments 6
-    annelid limit-cycle riddle2022-planar --time continuous -o cycle.png
-    annelid limit-cycle --set controller.gate_time_constant_ms=200 --set body.gain=1.9
-    annelid limit-cycle --json | jq .continuous.multipliers[0]
-    """
-    from annelid.analysis.limit_cycle import Time, limit_cycle
-    from annelid.draw.figures.limit_cycle import limit_cycle_figure
-    from annelid.draw.plots import plot_path
-    from annelid.draw.table import TIMES, cycle_numbers, cycle_table
-    from annelid.terminal import Console
-
-    if output is not None:
-        output = plot_path(output)
-        refuse_existing(output, force)
-    config = config_of("riddle2022-planar" if preset is None else preset, overrides_of(assignments), segments)
-    wanted = cast(list["Time"], times or list(get_args(Time)))
-    cycles = {time: limit_cycle(config, time=time, neuron=neuron, threshold_mV=threshold) for time in wanted}
-    if not give({"name": config.name, "n_segments": config.body.n_segments} | cycle_numbers(cycles)):
-        Console().print(cycle_table(f"{config.name}, {config.body.n_segments} segments", cycles))
-    if output is not None:
-        named = {TIMES[time]: cycle for time, cycle in cycles.items()}
-        print_paths([limit_cycle_figure(named, output)])
-
-
 def _lines(end_s: float) -> Callable[[float, float], object] | None:
     """Returns what writes a line on stderr every ten seconds of a run; None on a terminal, which gets a bar."""
     from annelid.experiment.progress import Lines
@@ -302,7 +246,12 @@ def _errors(vary: list[str] | None) -> dict[str, float]:
 
 
 def locked_folder(out: Path | None, name: str) -> Path:
-    """Returns the folder to run into, or a new one with the next number, which this command alone writes."""
+    """Returns the folder to run into, or a new one with the next number, which this command alone writes.
+
+    Args:
+        out: The folder that was named, or None.
+        name: Of the worm, which begins the name of a new folder.
+    """
     if out is not None:
         lock(out)
         return out

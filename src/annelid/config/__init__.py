@@ -8,10 +8,6 @@ overridden by its dotted path (``body.mesh.n_segments=4``). A level of `fidelity
 
 from __future__ import annotations
 
-import warnings
-from importlib import import_module
-from typing import Any
-
 from annelid.config.arena import ArenaKind
 from annelid.config.checking import (
     REPLACED,
@@ -25,8 +21,18 @@ from annelid.config.checking import (
     whole_path,
 )
 from annelid.config.fidelity import LEVELS, Fidelity, find_level
-from annelid.config.kinds import BodyKind, ControllerKind, Knob, TurningKind, class_named, kinds_of
+from annelid.config.kinds import (
+    BodyKind,
+    Choice,
+    ControllerKind,
+    Kind,
+    Knob,
+    OwnModel,
+    TurningKind,
+    kinds_of,
+)
 from annelid.config.loading import (
+    add_presets,
     arena_names,
     arena_summary,
     arena_text,
@@ -37,35 +43,36 @@ from annelid.config.loading import (
     preset_text,
 )
 from annelid.config.run import Clock, Guard, Record, RunConfig, StretchSensor
-from annelid.config.sections import Section
+from annelid.config.sections import Length, Line, NonNegative, Positive, Section, Share
 from annelid.config.study import Study, Vary, load_study
 from annelid.textfiles import toml_value
-
-_MOVED = dict.fromkeys(("Joints", "Mesh", "Pins", "Springs", "Strands"), "annelid.body.worm") | {
-    "Contraction": "annelid.control.open_loop",
-    "DescendingDrive": "annelid.control.robust",
-}
-"""Sections that are no kinds, which the first edition had here."""
-_RENAMED = {"SnsController": "Sns", "Arena": "ArenaKind"}
-"""Names of the first edition that differ from today's."""
 
 __all__ = [
     "LEVELS",
     "REPLACED",
     "ArenaKind",
     "BodyKind",
+    "Choice",
     "Clock",
     "ControllerKind",
     "Fidelity",
     "Guard",
+    "Kind",
     "Knob",
+    "Length",
+    "Line",
+    "NonNegative",
+    "OwnModel",
+    "Positive",
     "Record",
     "RunConfig",
     "Section",
+    "Share",
     "StretchSensor",
     "Study",
     "TurningKind",
     "Vary",
+    "add_presets",
     "arena_names",
     "arena_summary",
     "arena_text",
@@ -87,16 +94,3 @@ __all__ = [
     "unit_of",
     "whole_path",
 ]
-
-
-def __getattr__(name: str) -> Any:
-    """Finds names of the first edition where they are now, for one release."""
-    if name in _MOVED:
-        found = getattr(import_module(_MOVED[name]), name)
-    else:
-        found = class_named(_RENAMED.get(name, name)) if not name.startswith("_") else None
-    if found is None:
-        raise AttributeError(f"module 'annelid.config' has no attribute {name!r}")
-    where = f"{found.__module__}.{found.__name__}"
-    warnings.warn(f"annelid.config.{name} is now {where}", DeprecationWarning, stacklevel=2)
-    return found

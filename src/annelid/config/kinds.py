@@ -2,7 +2,7 @@
 
 A kind is a subclass of one of the families below in a module of its own: its fields, its checks, what it builds, its
 citations, and what can be changed while it runs. Defining the class registers it. Another package adds kinds by an
-entry point of the group `annelid.registry.GROUP`, which names the module that defines them.
+entry point of the group `annelid.registry.KINDS`, which names the module that defines them.
 """
 
 from __future__ import annotations
@@ -215,9 +215,7 @@ class BodyKind(Kind):
         n_segments: Actuated segments.
     """
 
-    registry: ClassVar[Registry[type[Any]]] = Registry(
-        "body.kind", "annelid.body.worm", "annelid.body.mjcf", "annelid.planar"
-    )
+    registry: ClassVar[Registry[type[Any]]] = Registry("body.kind", "annelid.body.worm")
     default: ClassVar[str] = "worm"
     needs_arena: ClassVar[bool] = False
     is_planar: ClassVar[bool] = False
@@ -296,12 +294,6 @@ def kinds_in(section: Section) -> set[type[Kind]]:
     within = [value for name in type(section).model_fields if isinstance(value := getattr(section, name), Section)]
     own = {type(section)} if isinstance(section, Kind) else set()
     return own.union(*map(kinds_in, within))
-
-
-def class_named(name: str) -> type[Kind] | None:
-    """Returns the class of a kind, or one that kinds are derived from, by its own name; None where there is none."""
-    every = [known for kind in every_kind() for known in kind.__mro__]
-    return next((known for known in every if known.__name__ == name and issubclass(known, Kind)), None)
 
 
 def default_of(family: type[Family]) -> Family:

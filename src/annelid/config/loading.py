@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import reduce
 from importlib import resources
+from importlib.resources.abc import Traversable
 from itertools import takewhile
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from annelid.config.fidelity import HOME, RESOLUTION, find_level
 from annelid.config.kinds import BodyKind, kind_of_file
 from annelid.config.run import RunConfig
 from annelid.errors import ConfigError, UnreadableText, listed, shown, suggest
+from annelid.registry import load_extensions
 from annelid.textfiles import check_depth, parse_toml, read_toml, toml_value
 
 DEFAULT_BASE = "riddle2023-rods"
@@ -23,11 +25,22 @@ DEFAULT_BASE = "riddle2023-rods"
 
 MOST_EXTENDED = 50
 """Files of which each extends the next."""
+_packages = ["annelid"]
+"""Packages that have presets and arenas."""
+
+
+def add_presets(package: str) -> None:
+    """Adds the presets and arenas of a package, the TOML files of its folders ``presets`` and ``arenas``.
+
+    Args:
+        package: Its name. The module of its entry point `annelid.registry.KINDS` calls this.
+    """
+    _packages.append(package)
 
 
 def preset_names() -> list[str]:
-    """Returns the names of the presets that come with annelid."""
-    return _names("presets")
+    """Returns the names of the presets of annelid and of other installed packages."""
+    return sorted(_files("presets"))
 
 
 def preset_text(source: str | Path) -> str:
@@ -61,8 +74,8 @@ def preset_text(source: str | Path) -> str:
 
 
 def arena_names() -> list[str]:
-    """Returns the names of the arenas that come with annelid."""
-    return _names("arenas")
+    """Returns the names of the arenas of annelid and of other installed packages."""
+    return sorted(_files("arenas"))
 
 
 def arena_text(name: str) -> str:
@@ -83,15 +96,19 @@ def arena_summary(name: str) -> str:
     return str(parse_toml(arena_text(name), name)["summary"])
 
 
-def _names(folder: str) -> list[str]:
-    entries = (resources.files("annelid") / folder).iterdir()
-    return sorted(entry.name.removesuffix(".toml") for entry in entries if entry.name.endswith(".toml"))
+def _files(folder: str) -> dict[str, Traversable]:
+    """Returns the TOML files in a folder of every package by their names without the suffix; the first of a name."""
+    load_extensions()
+    folders = [found for package in _packages if (found := resources.files(package) / folder).is_dir()]
+    entries = [entry for found in reversed(folders) for entry in found.iterdir()]
+    return {entry.name.removesuffix(".toml"): entry for entry in entries if entry.name.endswith(".toml")}
 
 
 def _text(folder: str, what: str, name: str) -> str:
-    if name not in _names(folder):
-        raise ConfigError(f"unknown {what} {shown(name)}: {suggest(name, _names(folder))}")
-    return (resources.files("annelid") / folder / f"{name}.toml").read_text(encoding="utf-8")
+    files = _files(folder)
+    if name not in files:
+        raise ConfigError(f"unknown {what} {shown(name)}: {suggest(name, files)}")
+    return files[name].read_text(encoding="utf-8")
 
 
 def load_config(

@@ -67,7 +67,7 @@ SENSED: dict[str, Sensed] = {
 
 @dataclass(frozen=True, slots=True)
 class ControllerCode:
-    """A controller as `annelid.export.firmware` writes it: its network, and C99 for what it does beside it.
+    """A controller as `annelid_lab.firmware.controllers` writes it: its network, and C99 for what it does beside it.
 
     The statements may use the type ``real``, the integers ``i`` and ``j``, the counts ``N_SEGMENTS``, ``N_MUSCLES`` and
     ``N_INPUTS``, ``sensors->NAME`` of what is sensed, ``now.NAME`` of the state (``now.potential_mV``, ``now.n_steps``

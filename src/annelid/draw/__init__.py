@@ -24,42 +24,68 @@ if TYPE_CHECKING:
     from annelid.body.actuation import PIN_RGBA
     from annelid.body.formulations.rods.net import STRAND_RGBA
     from annelid.draw.camera import VIEWS_DEG, fitting_distance, picture_axes, picture_points
+    from annelid.draw.canvas import plain, save
     from annelid.draw.figures import RUN_FIGURES
+    from annelid.draw.figures.comparison import lengths_figure, potentials_figure, travel_figure
+    from annelid.draw.figures.experiments import Mark, Panel, load_frame_figure, progress_figure, uncertainty_figure
     from annelid.draw.figures.network_diagram import network_figure
     from annelid.draw.gl import find_backend
+    from annelid.draw.overlay import legend_handle
     from annelid.draw.page import html_page
     from annelid.draw.planar_scene import bent_rhombi, rhombi
-    from annelid.draw.plots import figure7
-    from annelid.draw.scene import CONTRACTED_WIDTH, SPRING_RGBA, Skeleton, postures_of, render_still
+    from annelid.draw.plots import figure7, plot_path
+    from annelid.draw.render import DEFAULT_CAMERA, render_frame, render_video
+    from annelid.draw.scene import CONTRACTED_WIDTH, SPRING_RGBA, Skeleton, WormScene, postures_of, render_still
+    from annelid.draw.table import UNKNOWN, comparison_table, fields_table, framed_table
 
 __all__ = [
     "CONTRACTED",
     "CONTRACTED_WIDTH",
+    "DEFAULT_CAMERA",
     "PIN_RGBA",
     "RUN_FIGURES",
     "SPRING_RGBA",
     "STRAND_RGBA",
+    "UNKNOWN",
     "VIEWS_DEG",
     "WIDTH_IN",
+    "Mark",
+    "Panel",
     "Skeleton",
+    "WormScene",
     "activation_color",
     "bent_rhombi",
     "canvas",
+    "comparison_table",
     "draw_lines",
+    "fields_table",
     "figure7",
     "find_backend",
     "fitting_distance",
+    "framed_table",
     "html_page",
+    "legend_handle",
+    "lengths_figure",
     "line_looks",
+    "load_frame_figure",
     "network_figure",
     "panel_title",
     "picture_axes",
     "picture_points",
+    "plain",
+    "plot_path",
     "postures_of",
+    "potentials_figure",
+    "progress_figure",
+    "render_frame",
     "render_still",
+    "render_video",
     "rhombi",
+    "save",
     "save_both",
     "segment_colors",
+    "travel_figure",
+    "uncertainty_figure",
 ]
 
 __getattr__, __dir__ = lazy(__name__)

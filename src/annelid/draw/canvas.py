@@ -80,7 +80,13 @@ def canvas(height_in: float, width_in: float = WIDTH_IN, *, dark: bool = False) 
 
 
 def save(figure: Figure, path: str | Path, **options: Any) -> Path:
-    """Writes a figure in the format of the path's suffix; the file appears only when it is whole."""
+    """Writes a figure in the format of the path's suffix; the file appears only when it is whole.
+
+    Args:
+        figure: The figure.
+        path: The file.
+        options: Of matplotlib's ``savefig``.
+    """
     path = Path(path)
     with whole_file(path) as draft:
         figure.savefig(draft, metadata=_UNDATED.get(path.suffix.lower()), **options)

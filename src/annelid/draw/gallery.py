@@ -24,7 +24,7 @@ def draw_all(run: Run, folder: Path, *, video: bool, quiet: bool, complain: Call
     At the end ``complain`` is called with one sentence for each reason for which pictures could not be drawn.
     """
     frame_time = frame_time_s(run)
-    frame_remedy = f"annelid render {folder} --time {frame_time:g}"
+    frame_remedy = f"annelid draw {folder} --time {frame_time:g}"
     video_path = folder / "video.mp4"
 
     def draw_video(path: Path) -> Path:
@@ -32,11 +32,11 @@ def draw_all(run: Run, folder: Path, *, video: bool, quiet: bool, complain: Call
             return render_video(run, path, progress=progress)
 
     pictures: list[tuple[str, Callable[[Path], Path], str]] = [
-        ("figure7.png", lambda path: figure7(run, path), f"annelid plot {folder}"),
+        ("figure7.png", lambda path: figure7(run, path), f"annelid draw {folder}"),
         ("frame.png", lambda path: render_frame(run, frame_time, path), frame_remedy),
     ]
     if video:
-        pictures.append((video_path.name, draw_video, f"annelid render {folder} --video {video_path}"))
+        pictures.append((video_path.name, draw_video, f"annelid draw {folder} --video {video_path}"))
     failures: dict[str, list[tuple[str, str]]] = {}
     for name, draw, remedy in pictures:
         try:

@@ -181,7 +181,13 @@ def _bar(figure: Figure, left: float, right: float, height: float, ink: Any) -> 
 
 
 def legend_handle(name: str, rgb: Sequence[float], look: str) -> Line2D:
-    """Returns what stands in a legend for an entry."""
+    """Returns what stands in a legend for an entry.
+
+    Args:
+        name: What the legend says.
+        rgb: Colour, three numbers from 0 to 1.
+        look: ``line`` or ``ball``.
+    """
     from matplotlib.lines import Line2D
 
     red, green, blue = rgb[:3]

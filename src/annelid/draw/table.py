@@ -1,9 +1,8 @@
-"""Tables in the terminal: a run's numbers, runs side by side, limit cycles, presets and arenas."""
+"""Tables in the terminal: a run's numbers, runs side by side, presets and arenas."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from math import isnan
 from typing import TYPE_CHECKING, Any
 
 from annelid.analysis.comparison import LACKING, Comparison, Number, relative_difference
@@ -28,14 +27,12 @@ from annelid.errors import listed, shortened
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from annelid.analysis.agreement import Agreement
-    from annelid.analysis.limit_cycle import LimitCycle
     from annelid.config import RunConfig
 
 UNKNOWN = "-"
 MOST_CHARACTERS = 400
 """Of a value in a table of fields; a scene has up to a million."""
-_ONSETS_SHOWN, _MULTIPLIERS_SHOWN = 12, 4
+_ONSETS_SHOWN = 12
 COMPARED = ("reference", "deviation")  # headings of what stands beside our numbers
 NEXT = (
     f"annelid run {FORMULATION} (that formulation itself, a minute), "
@@ -91,18 +88,16 @@ COMPARISON_ROWS: dict[str, Row] = {
 }
 """The same of a comparison."""
 
-TIMES = {
-    "continuous": "continuous time",
-    "located": "own steps, sensors located",
-    "stepped": "own steps",
-}
-"""Headings of limit cycles, by `annelid.analysis.limit_cycle.Time`."""
-# A smaller multiplier is lost in products of rounded matrices.
-_ROUNDING = 1e-12
-
 
 def framed_table(*headings: str, title: str | None = None, caption: str | None = None, min_width: int = 0) -> Table:
-    """Returns an empty table in the project's look, whose long words go on in the next line."""
+    """Returns an empty table in the project's look, whose long words go on in the next line.
+
+    Args:
+        headings: Of its columns.
+        title: Above it, bold.
+        caption: Below it.
+        min_width: Least width, characters.
+    """
     from rich import box
     from rich.table import Table
 
@@ -208,60 +203,6 @@ def fields_table(comparison: Comparison) -> Table:
         if not (other_kinds and field.startswith(("body.", "arena.")) and LACKING in values):
             table.add_row(field, *(UNKNOWN if value is LACKING else _setting(value) for value in values))
     return table
-
-
-def agreement_table(found: Agreement) -> Table:
-    """Returns a run's agreement with a measured log, two lines for each signal: measured and simulated."""
-    periods = [UNKNOWN if isnan(one) else f"{one:.3f} s" for one in found.period_s]
-    caption = f"lag {found.lag_s:.3f} s, clock drift {100 * found.clock_drift:.2f} %"
-    table = framed_table("signal", "amplitude", "duty", "period", "rms error", "phase", "waveform", caption=caption)
-    table.columns[0].no_wrap = True
-    for name, one in found.signals.items():
-        scale, unit = (1e3, "mm") if one.unit == "m" else (1.0, one.unit)
-        share = UNKNOWN if isnan(one.relative) else f"{100 * one.relative:.0f} %"
-        table.add_row(
-            f"{name}\n{one.signal}",
-            "\n".join(f"{scale * size:.3g} {unit}" for size in one.amplitude),
-            "\n".join(f"{100 * high:.0f} %" for high in one.duty),
-            "\n".join(periods),
-            f"{scale * one.rms:.3g} {unit}\n{share}",
-            UNKNOWN if isnan(one.phase) else f"{one.phase:+.2f}",
-            UNKNOWN if isnan(one.waveform) else f"{one.waveform:.2f}",
-        )
-    return table
-
-
-def cycle_table(name: str, cycles: Mapping[str, LimitCycle]) -> Table:
-    """Returns the limit cycles of one worm by `annelid.analysis.limit_cycle.Time`, with their largest multipliers."""
-    main = next(iter(cycles.values()))
-    caption = "A multiplier is what one cycle leaves of a small deviation; the one at 1 is a shift along the cycle."
-    if set(cycles) != {"continuous"}:
-        caption += " In steps none is at 1: a shift by less than a step is not one along the cycle."
-    title = f"{name}: limit cycle in {len(main.labels)} states"
-    # Title and caption would fold where there is only one column.
-    table = framed_table("quantity", *(TIMES[time] for time in cycles), title=title, caption=caption, min_width=72)
-    table.add_row("period (ms)", *(f"{1e3 * cycle.period_s:.2f}" for cycle in cycles.values()))
-    for i in range(min(_MULTIPLIERS_SHOWN, len(main.labels))):
-        table.add_row(f"multiplier {i + 1}", *(_multiplier(cycle.multipliers[i]) for cycle in cycles.values()))
-    table.add_row("orbit closes within", *(f"{cycle.closing_error:.0e} of a range" for cycle in cycles.values()))
-    return table
-
-
-def cycle_numbers(cycles: Mapping[str, LimitCycle]) -> dict[str, Any]:
-    """Returns the same numbers for JSON: multipliers as pairs of real and imaginary part, times in s."""
-    return {
-        time: {
-            "period_s": cycle.period_s,
-            "timestep_s": cycle.timestep_s,
-            "closing_error": cycle.closing_error,
-            "multipliers": [[float(value.real), float(value.imag)] for value in cycle.multipliers],
-            "trivial": cycle.trivial,
-            "states": list(cycle.labels),
-            "phase_s": cycle.time_s.tolist(),
-            "phase_response_s": cycle.phase_response.tolist(),
-        }
-        for time, cycle in cycles.items()
-    }
 
 
 def summary_rows(
@@ -414,14 +355,6 @@ def _first_of_order(order: Sequence[int]) -> str:
 
 def _setting(value: Any) -> str:
     return "not set" if value is None else shortened(toml_value(value), MOST_CHARACTERS)
-
-
-def _multiplier(value: complex) -> str:
-    if abs(value) < _ROUNDING:
-        return f"below {_ROUNDING:.0e}"
-    if abs(value.imag) < _ROUNDING:
-        return f"{value.real:.4g}"
-    return f"{value.real:.3g} {'+' if value.imag > 0 else '-'} {abs(value.imag):.3g}i"
 
 
 def _percents(shares: Number, form: Callable[[float], str]) -> str:

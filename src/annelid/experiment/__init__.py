@@ -17,17 +17,18 @@ from typing import TYPE_CHECKING
 from annelid.lazy import lazy
 
 if TYPE_CHECKING:
-    from annelid.experiment.case import SHEAR_OVER_YOUNG, Case
+    from annelid.experiment.case import SHEAR_OVER_YOUNG, Case, write_worm
     from annelid.experiment.check import Check, check, compare, finer_steps, more_elements, refinements
-    from annelid.experiment.executors import Processes, end_after
-    from annelid.experiment.fingerprint import code_fingerprint
+    from annelid.experiment.executors import Processes, answers, end_after
+    from annelid.experiment.fingerprint import code_fingerprint, physics_fingerprint, room_of
     from annelid.experiment.outcome import Hold, Outcome
-    from annelid.experiment.progress import StudyProgress
+    from annelid.experiment.progress import StudyProgress, study_progress
     from annelid.experiment.store import Store, case_key
-    from annelid.experiment.tune import Judged, judge, numerical_problem
+    from annelid.experiment.tune import START, Judged, judge, numerical_problem
 
 __all__ = [
     "SHEAR_OVER_YOUNG",
+    "START",
     "Case",
     "Check",
     "Hold",
@@ -36,6 +37,7 @@ __all__ = [
     "Processes",
     "Store",
     "StudyProgress",
+    "answers",
     "case_key",
     "check",
     "code_fingerprint",
@@ -45,7 +47,11 @@ __all__ = [
     "judge",
     "more_elements",
     "numerical_problem",
+    "physics_fingerprint",
     "refinements",
+    "room_of",
+    "study_progress",
+    "write_worm",
 ]
 
 __getattr__, __dir__ = lazy(__name__)

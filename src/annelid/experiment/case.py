@@ -83,5 +83,11 @@ def write_worm(path: Path, source: str, fields: Mapping[str, Any], heading: Sequ
     """Writes a worm as a file that ``annelid run`` takes: the preset or file that it extends, and what differs.
 
     Fields are given by their dotted paths; the heading are lines of a comment.
+
+    Args:
+        path: The file.
+        source: The preset or file that it extends.
+        fields: What differs, by dotted path.
+        heading: Lines of a comment above.
     """
     write_text(path, toml_text({"extends": absolute(source), **nested(fields)}, "\n".join(heading)))

@@ -1,6 +1,6 @@
 """What is uncertain about a worm's body, by how much, and Monte Carlo samples of it.
 
-Errors and their correlations are those of a fit (`annelid.experiment.identify`), as ``annelid calibrate`` writes it;
+Errors and their correlations are those of a fit as ``annelid calibrate`` writes it;
 the one that comes with annelid is of the load frame alone. They are relative, about the run's own values.
 """
 
@@ -22,16 +22,22 @@ from annelid.body.actuators.servo import wrap_factors
 from annelid.body.worm import WormBody
 from annelid.config import RunConfig
 from annelid.errors import ConfigError, UnreadableText, suggest
-from annelid.experiment.identify.study import PARAMETERS
 from annelid.experiment.space import unit_samples
 from annelid.morphology import Array
 from annelid.textfiles import parse_json, read_text
 
 CABLE = "cable_friction"
 FIELDS: Mapping[str, tuple[str, ...]] = {
-    name: tuple(field for field in parameter.fields if not field.startswith("experiments."))
-    for name, parameter in PARAMETERS.items()
-} | {CABLE: ("body.rings.peak_force_N", "body.rings.force_limit_N")}
+    "young_modulus": ("body.strands.young_modulus_Pa", "body.strands.shear_modulus_Pa"),
+    "dry_friction": ("body.joints.dry_friction_Nm",),
+    CABLE: ("body.rings.peak_force_N", "body.rings.force_limit_N"),
+    "softening_strain": (),
+    "damping_time": ("body.strands.damping_time_s",),
+    "spring_rate": ("body.springs.stiffness_N_per_m",),
+    "spring_rest_length": ("body.springs.rest_length_m",),
+    "viscous_friction": ("body.joints.viscous_friction_Nms_per_rad",),
+    "floor_friction": ("arena.friction",),
+}
 """What can be varied, and the fields that it scales: what a fit may change, and the floor. The shear modulus keeps its
 ratio to Young's. The cable's friction scales the rings' force by the mean tension of a cable, ``(1 - exp(-m)) / m`` of
 that at its pulled end. By default what the load frame can distinguish is varied: the first

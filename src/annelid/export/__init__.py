@@ -1,23 +1,18 @@
-"""What goes elsewhere: runs as tables, NWB, pictures, pages, models; controllers as C99; networks as C99 or LEMS."""
+"""What goes elsewhere: runs as tables, pictures, pages and models."""
 
-from annelid.export.c_source import Firmware
-from annelid.export.firmware import controller_firmware, controller_network, network_firmware
-from annelid.export.formats import FORMATS, Format, find_format
-from annelid.export.host import HostFirmware
-from annelid.export.lems import lems_text, read_lems
-from annelid.export.tables import Selection, selected
+from annelid.export.formats import FORMATS, SELECTION, Format, find_format
+from annelid.export.tables import Progress, Selection, about, selected, signal_names
+from annelid.lazy import moved
 
 __all__ = [
     "FORMATS",
-    "Firmware",
+    "SELECTION",
     "Format",
-    "HostFirmware",
+    "Progress",
     "Selection",
-    "controller_firmware",
-    "controller_network",
+    "about",
     "find_format",
-    "lems_text",
-    "network_firmware",
-    "read_lems",
     "selected",
+    "signal_names",
 ]
+__getattr__ = moved(__name__, "annelid_lab.firmware")

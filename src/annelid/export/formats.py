@@ -14,13 +14,14 @@ import numpy as np
 from annelid.body.assemble import mjcf_text
 from annelid.draw.render import Progress, render_video
 from annelid.errors import MissingDependency, RunFileError
-from annelid.export.nwb import write_nwb
 from annelid.export.page import write_page
 from annelid.export.tables import write_csv_tables, write_matlab, write_parquet_tables
 from annelid.output import with_suffix, write_text
+from annelid.registry import FORMATS as GROUP
 from annelid.registry import Registry
 
 if TYPE_CHECKING:
+    from annelid.config import RunConfig
     from annelid.simulation.runfile import Run
 
 WINDOW = frozenset({"--from-time", "--to-time"})
@@ -39,6 +40,7 @@ class Format:
         options: Options of the selection that it takes.
         write: Writes a run to a path, calling back with steps done and in all; returns the files.
         package: What it needs that not everybody has installed, or None.
+        worm: Gives the text of a worm that was not run, or None where only runs can be written.
     """
 
     name: str
@@ -47,6 +49,7 @@ class Format:
     options: frozenset[str]
     write: Callable[[Run, Path, Progress], list[Path]]
     package: str | None = None
+    worm: Callable[[RunConfig], str] | None = None
 
     @property
     def many(self) -> bool:
@@ -79,7 +82,7 @@ class Format:
         return with_suffix(output, (self.suffix,), self.name, default=self.suffix)
 
 
-FORMATS: Registry[Format] = Registry("format", "annelid.export", error=RunFileError)
+FORMATS: Registry[Format] = Registry("format", "annelid.export", error=RunFileError, group=GROUP)
 """Every format by its name; a module in this package, or one of another package, adds its own."""
 
 
@@ -129,10 +132,9 @@ for _format in (
     Format("csv", "csv", ".csv", SELECTION, write_csv_tables),
     Format("mat", "run.mat", ".mat", SELECTION, lambda run, path, _: [write_matlab(run, path)]),
     Format("parquet", "parquet", ".parquet", SELECTION, write_parquet_tables, "pyarrow"),
-    Format("nwb", "run.nwb", ".nwb", SELECTION, write_nwb, "pynwb"),
     Format("mp4", "video.mp4", ".mp4", WINDOW, _video),
     Format("gif", "video.gif", ".gif", WINDOW, partial(_video, fps=GIF_FPS)),
     Format("html", "report.html", ".html", WINDOW, lambda run, path, progress: [write_page(run, path, progress)]),
-    Format("mjcf", "worm.xml", ".xml", frozenset(), lambda run, path, _: [write_mjcf(run, path)]),
+    Format("mjcf", "worm.xml", ".xml", frozenset(), lambda run, path, _: [write_mjcf(run, path)], worm=mjcf_text),
 ):
     FORMATS.add(_format.name, _format)

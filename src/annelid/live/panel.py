@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -23,7 +23,6 @@ from annelid.nervous.drawing import by_segment, role_of
 if TYPE_CHECKING:
     import viser
 
-    from annelid.analysis.agreement import Agreement
     from annelid.live.show import Show
 
 PLAY, NOW, AGAIN = "Play / pause", "Live", "Restart"
@@ -60,16 +59,6 @@ class Plot:
         start, stop = np.searchsorted(self.series[0], (first_s, last_s))
         every = max(1, -(-int(stop - start) // MOST_SAMPLES))
         return tuple(one[start + -start % every : stop : every] for one in self.series)
-
-
-def measured_plots(agreement: Agreement) -> dict[str, Plot]:
-    """Returns a plot for each column of a measured log: the log, dashed, and the run that it was aligned with."""
-    plots: dict[str, Plot] = {}
-    for name, one in agreement.signals.items():
-        curves = Curve("", "simulated", 0), Curve("", "measured", 1, dashed=True)
-        series = agreement.time_s, agreement.simulated[name], agreement.measured[name]
-        plots[f"measured: {name}"] = Plot(f"{one.signal} ({one.unit}), measured dashed", curves, 2, series=series)
-    return plots
 
 
 def neurons_of(names: Sequence[str]) -> Sequence[str]:
@@ -121,7 +110,7 @@ class Panel:
         speed: float,
         weight_N: float,
         legend: str,
-        agreement: Agreement | None = None,
+        plots: Mapping[str, Plot] | None = None,
     ) -> None:
         """Makes all elements; the worm's weight on Earth is what pokes are measured by."""
         gui = self._gui = server.gui
@@ -140,8 +129,8 @@ class Panel:
             with gui.add_folder("Network, coloured by potential", expand_by_default=len(neurons) <= MOST_NEURONS):
                 gui.add_html(network_html(network))
                 self._colors = gui.add_html("")
-        self._plots = ({} if agreement is None else measured_plots(agreement)) | plots_of(player.reel.names)
-        self._plot_folder = gui.add_folder(f"{'Signals' if agreement else 'Nervous system'}, last 5 s")
+        self._plots = {**(plots or {}), **plots_of(player.reel.names)}
+        self._plot_folder = gui.add_folder(f"{'Signals' if plots else 'Nervous system'}, last 5 s")
         self._chart: Any = None
         with self._plot_folder:
             choice = gui.add_dropdown("plot", list(self._plots), initial_value=next(iter(self._plots)))

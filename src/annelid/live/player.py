@@ -111,7 +111,7 @@ def config_of(source: RunConfig | Run) -> RunConfig:
     if not isinstance(config.body, WormBody):
         raise ConfigError(
             f"body.kind = {config.body.kind!r} has nothing to view in 3D; only the 3D worm (body.kind = 'worm') has: "
-            "use annelid run and annelid render"
+            "use annelid run and annelid draw"
         )
     return config
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Self
 
@@ -13,7 +13,7 @@ import numpy as np
 from annelid.config import Knob, RunConfig
 from annelid.errors import AnnelidError
 from annelid.live.living import Moment
-from annelid.live.panel import Panel, legend_html, status_html
+from annelid.live.panel import Panel, Plot, legend_html, status_html
 from annelid.live.picture import Painter, struck
 from annelid.live.player import config_of, player_of
 from annelid.live.server import LOOPBACK, Server
@@ -23,7 +23,6 @@ from annelid.simulation.runfile import Run
 if TYPE_CHECKING:
     import viser
 
-    from annelid.analysis.agreement import Agreement
 
 FRAMES_A_SECOND = 30.0  # at most; fewer where a step of the body takes longer
 LONGEST_TICK_S = 0.25  # a computer that was asleep does not make the view leap
@@ -53,7 +52,7 @@ class Show:
         host: str = LOOPBACK,
         port: int = 0,
         speed: float = 1.0,
-        agreement: Agreement | None = None,
+        plots: Mapping[str, Plot] | None = None,
     ) -> None:
         """Builds the worm, or reads the run, and begins to serve.
 
@@ -62,7 +61,7 @@ class Show:
             host: Address to listen on.
             port: Port, 0 for any that is free.
             speed: Simulated seconds per second.
-            agreement: The run and a measured log, aligned (`annelid.analysis.agreement`): drawn beside the worm.
+            plots: Further plots beside the worm, by their names.
 
         Raises:
             ConfigError: The body is planar, or cannot be built.
@@ -84,7 +83,7 @@ class Show:
         self.stage = Stage(self._server, self.config, painter, self.player.moment)
         weight_N = round(EARTH_M_PER_S2 * anatomy.total_mass_kg, 1)
         legend = legend_html(painter.arrow_N, anatomy.geometry.radius_m)
-        self.panel = Panel(self._server, self, speed, weight_N, legend, agreement)
+        self.panel = Panel(self._server, self, speed, weight_N, legend, plots)
         if self.player.worm is not None:
             self._server.scene.on_click()(lambda event: self.ask(self.poke, event.ray_origin, event.ray_direction))
 

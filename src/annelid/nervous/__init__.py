@@ -1,6 +1,7 @@
 """Neurons, synapses, networks and the paper's peristalsis network; knows no engine and no body."""
 
-from annelid.nervous.arrays import NetworkArrays
+from annelid.lazy import moved
+from annelid.nervous.arrays import NO_GATE, NetworkArrays
 from annelid.nervous.diagram import Diagram
 from annelid.nervous.functional_subnetworks import (
     Signals,
@@ -28,6 +29,7 @@ from annelid.nervous.neurons import (
     Firing,
     GapJunction,
     Gate,
+    Modulated,
     ModulatorySynapse,
     Neuron,
     SpikingSynapse,
@@ -43,41 +45,30 @@ from annelid.nervous.peristalsis import (
     neuron_names,
     peristalsis_network,
 )
-from annelid.nervous.phase_chain import DriveResponse, PhaseNetwork, PhaseState, PhaseStepper, phase_chain, steady_lags
-from annelid.nervous.shc import (
-    HeteroclinicRing,
-    HeteroclinicStepper,
-    bias_dwell_s,
-    handover_input,
-    largest_gain_per_s,
-    noise_dwell_s,
-)
-from annelid.nervous.stepper import GateStart, NetworkState, Scheme, Stepper
+from annelid.nervous.stepper import Factors, GateStart, NetworkState, Scheme, Stepper
+from annelid.nervous.toml import network_of_tables, network_tables
 from annelid.nervous.toolbox import export_network, import_network
 
 __all__ = [
+    "NO_GATE",
     "Channel",
     "Conductances",
     "Connection",
     "ConnectionKind",
     "Diagram",
-    "DriveResponse",
+    "Factors",
     "Firing",
     "GapJunction",
     "Gate",
     "GateStart",
     "HalfCentre",
-    "HeteroclinicRing",
-    "HeteroclinicStepper",
+    "Modulated",
     "ModulatorySynapse",
     "Network",
     "NetworkArrays",
     "NetworkState",
     "Neuron",
     "PeristalsisParameters",
-    "PhaseNetwork",
-    "PhaseState",
-    "PhaseStepper",
     "Scheme",
     "Signals",
     "SpikingSynapse",
@@ -88,7 +79,6 @@ __all__ = [
     "add_half_centre",
     "add_hold",
     "addition",
-    "bias_dwell_s",
     "differentiation",
     "division",
     "drive_conductance_uS",
@@ -96,18 +86,16 @@ __all__ = [
     "find_period",
     "half_centre_network",
     "half_centre_of_period",
-    "handover_input",
     "import_network",
     "integration",
-    "largest_gain_per_s",
     "multiplication",
+    "network_of_tables",
+    "network_tables",
     "neuron_names",
-    "noise_dwell_s",
     "oscillation_periods",
     "peristalsis_network",
     "persistent_sodium",
-    "phase_chain",
-    "steady_lags",
     "subtraction",
     "transmission",
 ]
+__getattr__ = moved(__name__, "annelid_studies.oscillators")

@@ -58,6 +58,10 @@ def read_network(text: str, make: type[Network]) -> Network:
 def network_of_tables(document: Mapping[str, Any], make: type[Network]) -> Network:
     """Builds a network of the class ``make`` from the tables of a text, as `network_tables` makes them.
 
+    Args:
+        document: The tables.
+        make: Class of the network.
+
     Raises:
         ConfigError: As of `Network.from_toml`.
     """

@@ -14,10 +14,16 @@ from annelid.simulation.stepping import Simulation, build_controller, build_plan
 
 if TYPE_CHECKING:
     from annelid.simulation.lock import locks
-    from annelid.simulation.worm import WormPlant, compile_worm
+    from annelid.simulation.progress import ProgressCallback
+    from annelid.simulation.recorder import Senses
+    from annelid.simulation.worm import ENGINE_WARNINGS, STATE_PARTS, WormPlant, compile_worm
 
 __all__ = [
+    "ENGINE_WARNINGS",
+    "STATE_PARTS",
+    "ProgressCallback",
     "Run",
+    "Senses",
     "Simulation",
     "WormPlant",
     "build_controller",

@@ -78,9 +78,9 @@ def read_scores(path: Path) -> list[Score]:
     except ValidationError as error:
         first = error.errors()[0]
         where = f"row {first['loc'][0]}, {first['loc'][-1]}"
-        raise RunFileError(f"{path} is no runs.csv of annelid challenge: {where}: {first['msg']}") from None
+        raise RunFileError(f"{path} is no runs.csv of annelid study challenge: {where}: {first['msg']}") from None
     except (OSError, ValueError, csv.Error) as error:
-        raise RunFileError(f"{path} is no runs.csv of annelid challenge: {error}") from None
+        raise RunFileError(f"{path} is no runs.csv of annelid study challenge: {error}") from None
     versions = {one.version for one in scores} - {all_tasks().version}
     if versions:
         raise RunFileError(f"{path} is of version {min(versions)} of the tasks; here it is {all_tasks().version}")

@@ -15,4 +15,4 @@ if TYPE_CHECKING:
 RUN_FIGURES: Registry[Callable[[Run, Path], Path]] = Registry(
     "figure", "annelid.draw.figures", "annelid.draw.plots", error=RunFileError
 )
-"""What `annelid plot` draws of one run to a path, by its name."""
+"""What `annelid draw` draws of one run to a path, by its name."""

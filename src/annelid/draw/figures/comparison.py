@@ -10,7 +10,7 @@ import numpy as np
 
 from annelid.analysis.track import forward_position
 from annelid.body.worm import WormBody
-from annelid.draw.canvas import canvas, line_entries, line_looks, panel_title, save, save_both
+from annelid.draw.canvas import canvas, line_entries, line_looks, panel_title, save
 from annelid.draw.plots import neuron_potentials
 from annelid.errors import RunFileError
 from annelid.protocols import Array
@@ -18,8 +18,6 @@ from annelid.simulation.runfile import Run
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from annelid.analysis.agreement import Agreement
 
 MOST_ROWS = 6  # segments that get a panel: of more, as many from the first to the last, evenly spaced
 _CM = 100.0
@@ -30,7 +28,13 @@ Curves = Callable[["Run"], Sequence[tuple[Values, float | None]]]
 
 
 def lengths_figure(runs: Sequence[Run], labels: Sequence[str], path: Path) -> Path:
-    """Draws how much each segment is longer than at rest, and its ring in shares of its longest."""
+    """Draws how much each segment is longer than at rest, and its ring in shares of its longest.
+
+    Args:
+        runs: The runs.
+        labels: A short name of each.
+        path: File to write; its suffix chooses the format.
+    """
     panels: dict[str, Curves] = {
         "Segment, longer than at rest (cm)": lambda run: [(_elongation(run), None)],
         "Ring (% of its longest)": lambda run: [(_rings(run), None)],
@@ -39,7 +43,13 @@ def lengths_figure(runs: Sequence[Run], labels: Sequence[str], path: Path) -> Pa
 
 
 def potentials_figure(runs: Sequence[Run], labels: Sequence[str], path: Path) -> Path:
-    """Draws the potentials of each segment's half-centre: contraction neurons thick, expansion neurons thin."""
+    """Draws the potentials of each segment's half-centre: contraction neurons thick, expansion neurons thin.
+
+    Args:
+        runs: The runs.
+        labels: A short name of each.
+        path: File to write; its suffix chooses the format.
+    """
     panels: dict[str, Curves] = {
         "Half-centres, above rest (mV); thick: contraction, thin: expansion": lambda run: [
             (_potentials(run, "contraction"), 1.5),
@@ -50,7 +60,16 @@ def potentials_figure(runs: Sequence[Run], labels: Sequence[str], path: Path) ->
 
 
 def travel_figure(runs: Sequence[Run], labels: Sequence[str], path: Path) -> Path:
-    """Draws the travel of the centre of mass along the initial heading, and its track seen from above."""
+    """Draws the travel of the centre of mass along the initial heading, and its track seen from above.
+
+    Args:
+        runs: The runs.
+        labels: A short name of each.
+        path: File to write; its suffix chooses the format.
+
+    Raises:
+        RunFileError: None of the runs recorded where the worm went.
+    """
     tracks = [_centre(run) for run in runs]
     drawn = [track is not None for track in tracks]
     if not any(drawn):
@@ -74,21 +93,6 @@ def travel_figure(runs: Sequence[Run], labels: Sequence[str], path: Path) -> Pat
             panels[1].set_aspect("equal", adjustable="datalim")
         _legend(figure, labels, drawn)
         return save(figure, path)
-
-
-def agreement_figure(found: Agreement, stem: Path) -> Path:
-    """Draws each measured signal over the simulated one, as ``.svg`` and ``.png``; returns the path of the latter."""
-    with canvas(0.7 + 1.25 * len(found.signals)) as figure:
-        panels = figure.subplots(len(found.signals), sharex=True, squeeze=False)[:, 0]
-        for axes, (name, one) in zip(panels, found.signals.items(), strict=True):
-            scale, unit = (_CM, "cm") if one.unit == "m" else (1.0, one.unit)
-            panel_title(axes, f"{name}: {one.signal}, rms {scale * one.rms:.2g} {unit}")
-            axes.set_ylabel(unit)
-            axes.plot(found.time_s, scale * found.measured[name], color="0.55", linewidth=2.6, label="measured")
-            axes.plot(found.time_s, scale * found.simulated[name], color="#1b2a6b", linewidth=1.2, label="simulated")
-        panels[-1].set_xlabel("time of the run (s)")
-        figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper left", ncols=2)
-        return save_both(figure, stem)
 
 
 def _over_time(runs: Sequence[Run], labels: Sequence[str], panels: Mapping[str, Curves], what: str, path: Path) -> Path:

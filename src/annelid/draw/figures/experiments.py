@@ -26,6 +26,10 @@ def load_frame_figure(loops: Mapping[str, tuple[ArrayLike, ArrayLike]], stem: st
     """Draws loops of a ring cable's force, N, over its displacement, m, ``(n,)`` each, the first in front.
 
     Writes ``<stem>.svg`` and ``.png``, as the two below, and returns the latter's path.
+
+    Args:
+        loops: Displacements and forces of each loop by its name.
+        stem: Path of both files without a suffix.
     """
     with canvas(3.6) as figure:
         axes = figure.subplots()
@@ -48,7 +52,14 @@ class Mark:
 
 
 def progress_figure(marks: Sequence[Mark], label: str, more_is_better: bool, stem: str | Path) -> Path:
-    """Draws every trial's value and the best so far over the trials' numbers; what does not walk is a tick below."""
+    """Draws every trial's value and the best so far over the trials' numbers; what does not walk is a tick below.
+
+    Args:
+        marks: The trials, in their order.
+        label: Of the axis, with its unit.
+        more_is_better: Whether the best value is the largest.
+        stem: Path of both files without a suffix.
+    """
     walking = [mark for mark in marks if mark.walks and mark.number >= 0]
     failed = [mark.number for mark in marks if not mark.walks and mark.number >= 0]
     numbers = np.array([mark.number for mark in walking])
@@ -114,6 +125,10 @@ def uncertainty_figure(panels: Sequence[Panel], path: str | Path) -> Path:
 
     The bars of a value are nested: each ends at the root of the sum of the squares of its own error and of those inside
     of it, so the outermost end is the total.
+
+    Args:
+        panels: The panels.
+        path: Path of the files without a suffix.
     """
     with canvas(3.4) as figure:
         widths = [1.0 + len(panel.values) for panel in panels]

@@ -12,11 +12,9 @@ from annelid.analysis import (
     PAPER_END_DIFFERENCE,
     PAPER_MIDDLE_DEFICIT,
     ROBOT_ELONGATION_M,
-    detect_slip,
     end_difference,
     forward_position,
     middle_deficit,
-    score_detections,
 )
 from annelid.experiment import Case
 from annelid.simulation import Run
@@ -42,6 +40,7 @@ from annelid_studies.riddle2023.examinations.design import WORMS
 from annelid_studies.riddle2023.examinations.friction import PAPERS_FRICTION, SLIPPERY, frictions_of
 from annelid_studies.riddle2023.figures.propagation import measure_propagation
 from annelid_studies.riddle2023.words import capitalised, in_unit, span
+from annelid_studies.slip_detector import detect_slip, score_detections
 from annelid_studies.worms import FAST, chain, fast, one_after_the_other, rods
 
 _of_results = partial(Claim, "Results")
@@ -433,6 +432,6 @@ def _slip_claim(evidence: Evidence) -> Claim:
         f"precision and recall are at least {RELIABLE:g}. It reports {span((one.found for one in found), 100, 0)} % of "
         "the slips sooner or later, and is seldom late, but its constants were chosen on one of these runs, and "
         "another detector may do better. The worm is the later six-segment one (riddle2025-muscles).",
-        "annelid experiment slip-detector",
+        "annelid study slip-detector",
         *judged((min(one.precision, one.recall) >= RELIABLE for one in found), "the gait and the friction"),
     )

@@ -65,7 +65,7 @@ def structure_claims(evidence: Evidence) -> list[Claim]:
             f"{geometry.n_strands} strands, {geometry.n_crossings} crossings in {len(geometry.plane_x_m)} planes",
             "The crossings follow from the helices alone. Other even numbers of strands from 6, other dimensions and "
             "other numbers of elements a side are built from the same formulae.",
-            "annelid build riddle2023",
+            "annelid export riddle2023 --to mjcf",
             *judged([geometry.n_strands == 12 and geometry.n_crossings == 90]),
         ),
         _of_structure(
@@ -86,7 +86,7 @@ def structure_claims(evidence: Evidence) -> list[Claim]:
             f"{1e3 * body.strands.one_number('linear_density_kg_per_m'):.1f} g/m in the authors' files",
             "The thinner strand is lighter than the tube by the same share as its area, even with the capsules' "
             "overlapping caps. Motors and cables, most of the robot's weight, are not in the model.",
-            "annelid presets riddle2023",
+            "annelid list presets riddle2023",
             *near([body.strands.one_number("linear_density_kg_per_m")], density, ""),
         ),
         pins_claim(evidence),
@@ -199,7 +199,7 @@ def actuation_claims(evidence: Evidence) -> list[Claim]:
             f"as printed {printed:.4f} with the contraction neuron excited, {meant:.4f} with the sign reversed",
             "With the printed sign a muscle would relax while its contraction neuron is excited, against the text "
             "below the equation and against Fig. 7. We use the reversed sign.",
-            "annelid presets riddle2023",
+            "annelid list presets riddle2023",
             *judged([printed > 0.5]),
         ),
         _of_actuation(
@@ -243,7 +243,7 @@ def actuation_claims(evidence: Evidence) -> list[Claim]:
             "Not tested by decision: what the compiler makes of the factor depends on the version of the engine, and "
             "on numerical inertia. The compiler of the paper's time made a peak force of 117.57 N of it, which our "
             "presets state.",
-            "annelid presets riddle2023",
+            "annelid list presets riddle2023",
             "not testable here",
         ),
         velocity_claim(evidence),
@@ -304,7 +304,7 @@ def control_claims(evidence: Evidence) -> list[Claim]:
             "persistent sodium current with a slow gate",
             "The equations have instantaneous activation and a gate of up to 300 ms, which sets the period. The name "
             "changes nothing in the results.",
-            "annelid presets riddle2023",
+            "annelid list presets riddle2023",
             "does not hold",
         ),
         _of_control(

@@ -1,7 +1,0 @@
-"""Planar worms of the literature, with the same face as the 3D one."""
-
-from annelid.planar.boxerbaum2012 import Boxerbaum2012Plant
-from annelid.planar.daltorio2013 import Daltorio2013Plant
-from annelid.planar.riddle2022 import Riddle2022Plant
-
-__all__ = ["Boxerbaum2012Plant", "Daltorio2013Plant", "Riddle2022Plant"]

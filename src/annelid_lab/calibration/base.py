@@ -1,0 +1,140 @@
+"""What every kind of experiment has: its data, what it simulates of a worm, and what it predicts."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Protocol
+
+import numpy as np
+from pydantic import Field
+
+from annelid.config import Kind, Line, Positive, RunConfig, Share
+from annelid.errors import ConfigError
+from annelid.protocols import Array
+from annelid.registry import Registry
+from annelid_lab.logs.measured import Column, LogMap, read_measured
+
+Found = Mapping[str, Array]
+"""Arrays that a test of a worm gives, by name."""
+FEWEST = 8
+"""Points that an experiment must have."""
+
+
+class Test(Protocol):
+    """What is done to a worm in an experiment: picklable, and its ``repr`` says all that it depends on."""
+
+    def run(self, config: RunConfig) -> Found:
+        """Does it to a worm."""
+        ...
+
+
+@dataclass(frozen=True)
+class Data:
+    """Measured points.
+
+    Attributes:
+        at: Where each was measured, such as a time or a displacement, ``(n,)``.
+        values: What was measured, ``(n,)``.
+        series: Which stretch of points each belongs to, ``(n,)``; errors are correlated within one only.
+        labels: What the two are, with their units, for axes.
+        unit: Of the values.
+        notes: What was handled, a sentence each.
+        source: What the experiment itself needs of its data.
+    """
+
+    at: Array
+    values: Array
+    series: np.ndarray
+    labels: tuple[str, str]
+    unit: str
+    notes: tuple[str, ...] = ()
+    source: Any = None
+
+
+class Experiment(Kind):
+    """Base of the experiments.
+
+    Attributes:
+        name: As residuals, parameters (``experiments.NAME.FIELD``) and tables call it.
+    """
+
+    registry: ClassVar[Registry[type[Experiment]]] = Registry("experiments.kind", "annelid_lab.calibration.kinds")
+    default: ClassVar[str] = "load-frame"
+    name: Annotated[Line, Field(pattern=r"^[A-Za-z][\w-]*$", max_length=40)] = Field(description="name in results")
+    data: Line = Field(description="file of the data, beside the study or below it")
+    noise_sd: Positive | None = Field(
+        default=None, description="standard deviation of the noise of one point, in the values' unit; none: estimated"
+    )
+    hold_out: tuple[tuple[Share, Share], ...] = Field(
+        default=(), description="parts of the points, in order from 0 to 1, that are predicted and not fitted"
+    )
+
+    @abstractmethod
+    def read(self, folder: Path) -> Data:
+        """Reads the data of the study in a folder.
+
+        Raises:
+            ConfigError: They lie elsewhere, or have no such column or another unit.
+            UnreadableText: They cannot be read.
+        """
+
+    def test(self, config: RunConfig, data: Data) -> Test | None:
+        """Returns what has to be simulated; None where a closed form predicts the points."""
+        return None
+
+    @abstractmethod
+    def predicted(self, config: RunConfig, data: Data, found: Found) -> Array:
+        """Predicts the points, ``(n,)``, from what the test of the worm gave."""
+
+    def numbers(self, data: Data, found: Found) -> dict[str, float]:
+        """Returns further numbers of a fit, by name."""
+        return {}
+
+
+def beside(folder: Path, given: str, what: str) -> Path:
+    """Returns the path of a file that a study names.
+
+    Raises:
+        ConfigError: It does not lie beside the study or below it.
+    """
+    path = folder / given
+    if Path(given).is_absolute() or not path.resolve().is_relative_to(folder.resolve()):
+        raise ConfigError(f"{what} = {given!r} must lie beside the study or below it: a relative path without '..'")
+    return path
+
+
+def read_columns(path: Path, time: str | None, wanted: Mapping[str, str]) -> tuple[dict[str, Array], tuple[str, ...]]:
+    """Reads columns of a table as `read_measured` does, in SI units.
+
+    Args:
+        path: The table.
+        time: Column of the time, which comes back as ``"time"``; None where there is none.
+        wanted: The SI unit that each column must have, by its name.
+
+    Returns:
+        The columns, ``(n,)`` each, without rows in which one is missing; and what was handled.
+    """
+    named = {name: Column(signal=name) for name in wanted}
+    log = read_measured(path, LogMap(time=time, rate_Hz=None if time else 1.0, map=named))
+    for name, unit in wanted.items():
+        if log.kinds[name] != unit:
+            raise ConfigError(f"column {name!r} of {path} is in {log.kinds[name]}, not in {unit}")
+        if np.nanmin(log.values[name]) == np.nanmax(log.values[name]):
+            raise ConfigError(f"column {name!r} of {path} never changes: nothing can be fitted to it")
+    whole = np.all([np.isfinite(log.values[name]) for name in wanted], axis=0)
+    if whole.sum() < FEWEST:
+        raise ConfigError(f"{path} has {whole.sum()} complete rows: at least {FEWEST} are needed")
+    return {"time": log.time_s[whole]} | {name: log.values[name][whole] for name in wanted}, log.notes
+
+
+def binned(at: Array, values: Array, n: int) -> tuple[Array, Array]:
+    """Means of points over n even ranges of where they were measured, those without a point left out."""
+    edges = np.linspace(at.min(), at.max(), n + 1)
+    place = np.clip(np.searchsorted(edges, at, side="right") - 1, 0, n - 1)
+    count = np.bincount(place, minlength=n)
+    there = count > 0
+    means = [np.bincount(place, weights=one, minlength=n)[there] / count[there] for one in (at, values)]
+    return means[0], means[1]

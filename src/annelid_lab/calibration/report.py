@@ -1,0 +1,180 @@
+"""What an identification leaves: numbers as JSON, a picture, tables, and the fitted worm as a file to run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.table import Table
+
+from annelid.experiment import write_worm
+from annelid.output import write_json
+from annelid_lab.calibration.figure import Drawn, identify_figure
+from annelid_lab.calibration.fit import Fit, fitted
+from annelid_lab.calibration.intervals import LEVEL, Intervals, band, intervals
+from annelid_lab.calibration.simulations import Simulations
+from annelid_lab.calibration.study import IdentifyStudy
+
+REPORT, WORM = "calibration.json", "calibrated.toml"
+
+
+@dataclass(frozen=True)
+class Identified:
+    """A study that is fitted.
+
+    Attributes:
+        study: The study.
+        folder: Where its data lie.
+        fit: The fit.
+        intervals: What it says of the parameters.
+    """
+
+    study: IdentifyStudy
+    folder: Path
+    fit: Fit
+    intervals: Intervals
+
+    @cached_property
+    def overrides(self) -> dict[str, Any]:
+        """Fields of the fitted worm that differ from the preset, by dotted path."""
+        changes = dict(self.study.set)
+        for name, one in self.study.parameters.items():
+            for field, share in one.fields.items():
+                paths = [path for path in self.study.paths(field) if not path.startswith("experiments.")]
+                changes |= {path: float(f"{share * self.fit.values[name]:.4g}") for path in paths}
+        return changes
+
+    def to_dict(self) -> dict[str, Any]:
+        """Returns all numbers, ready for JSON."""
+        fit, known = self.fit, self.intervals
+        return {
+            "study": self.study.model_dump(mode="json", exclude_none=True),
+            "parameters": {
+                name: {
+                    "value": value,
+                    "unit": self.study.parameters[name].unit,
+                    "relative_error": float(known.relative_error[i]),
+                    "low": float(known.profile[i, 0]),
+                    "high": float(known.profile[i, 1]),
+                    "bootstrap_low": float(known.bootstrap[i, 0]),
+                    "bootstrap_high": float(known.bootstrap[i, 1]),
+                    "at_bound": name in fit.at_bound,
+                }
+                for i, (name, value) in enumerate(fit.values.items())
+            },
+            "correlation": known.correlation.tolist(),
+            "combinations": {"relative_error": known.errors.tolist(), "directions": known.directions.tolist()},
+            "confused": list(known.confused),
+            "experiments": {
+                part.experiment.name: {
+                    "unit": part.data.unit,
+                    "points": len(part.data.at),
+                    "effective_points": part.noise.effective_points(part.data),
+                    "rms": part.rms,
+                    "rms_share": part.rms / float(np.abs(part.data.values).max()),
+                    "noise_sd": part.noise.noise,
+                    "discrepancy_sd": part.noise.discrepancy,
+                    "discrepancy_length": part.noise.length,
+                    "held_out": known.held_out.get(part.experiment.name, (0, 0))[0],
+                    "held_out_inside": known.held_out.get(part.experiment.name, (0, 0))[1],
+                    **part.numbers,
+                    "at": part.data.at.tolist(),
+                    "measured": part.data.values.tolist(),
+                    "fitted": part.fitted.tolist(),
+                    "notes": list(part.data.notes),
+                }
+                for part in fit.parts
+            },
+            "level": LEVEL,
+            "n_tests": fit.n_tests,
+        }
+
+
+def identify(
+    study: IdentifyStudy,
+    folder: Path,
+    simulations: Simulations | None = None,
+    note: Callable[[str], object] = lambda _: None,
+) -> Identified:
+    """Identifies a worm from the experiments of a study.
+
+    Args:
+        study: The study.
+        folder: Where the files lie that it names.
+        simulations: Where tests of worms are computed and kept; None for in this process and in memory.
+        note: Called with what was handled in the data, a sentence each.
+
+    Raises:
+        ConfigError: A file lies elsewhere, or data do not fit their experiment.
+        UnreadableText: A file cannot be read.
+        SimulationStopped: The worm that the fit starts from gives way.
+    """
+    fit, model = fitted(study, folder, Simulations() if simulations is None else simulations)
+    for part in fit.parts:
+        for sentence in part.data.notes:
+            note(f"{part.experiment.name}: {sentence}")
+    return Identified(study, folder, fit, intervals(fit, model))
+
+
+def tables(found: Identified) -> list[Table]:
+    """Tabulates parameters with their intervals, and experiments with their errors."""
+    fit, known = found.fit, found.intervals
+    caption = "; ".join(known.confused) or "the data tell all parameters apart"
+    first = Table("parameter", "unit", title=f"{found.study.name}: {fit.n_tests} tests of worms", caption=caption)
+    for heading in ("value", "95 % profile likelihood", "95 % block bootstrap", "largest correlation"):
+        first.add_column(heading, justify="right")
+    for i, (name, value) in enumerate(fit.values.items()):
+        others = np.delete(np.arange(len(fit.names)), i)
+        worst = others[np.abs(known.correlation[i, others]).argmax()] if len(others) else i
+        first.add_row(
+            name,
+            found.study.parameters[name].unit,
+            f"{value:.4g}" + (" (bound)" if name in fit.at_bound else ""),
+            *(f"{one[i, 0]:.4g} to {one[i, 1]:.4g}" for one in (known.profile, known.bootstrap)),
+            f"{known.correlation[i, worst]:+.2f} {fit.names[worst]}" if len(others) else "",
+        )
+    second = Table("experiment", "unit", title="errors of the experiments, standard deviations of a point")
+    for heading in ("rms", "of the peak", "noise", "discrepancy", "over", "points count as", "held out, inside"):
+        second.add_column(heading, justify="right")
+    for part in fit.parts:
+        n, inside = known.held_out.get(part.experiment.name, (0, 0))
+        second.add_row(
+            part.experiment.name,
+            part.data.unit,
+            f"{part.rms:.3g}",
+            f"{part.rms / np.abs(part.data.values).max():.1%}",
+            f"{part.noise.noise:.3g}",
+            f"{part.noise.discrepancy:.3g}",
+            f"{part.noise.length:.3g}",
+            f"{part.noise.effective_points(part.data):.1f} of {len(part.data.at)}",
+            f"{inside} of {n}" if n else "",
+        )
+    return [first, second]
+
+
+def write_identified(found: Identified, output: Path) -> list[Path]:
+    """Writes the numbers, the fitted worm and the picture into a folder."""
+    fit, known = found.fit, found.intervals
+    lines = [f"Identified by the study {found.study.name}: value, 95 % interval."]
+    for i, (name, value) in enumerate(fit.values.items()):
+        unit = found.study.parameters[name].unit
+        lines.append(f"  {name}: {value:.4g} {unit}, {known.profile[i, 0]:.4g} to {known.profile[i, 1]:.4g}")
+    lines.append(f"Errors for `annelid run --uncertainty-from {REPORT}`.")
+    write_worm(output / WORM, found.study.source(found.folder), {"name": found.study.name, **found.overrides}, lines)
+    return [write_json(output / REPORT, found.to_dict()), output / WORM, _figure(found, output / "calibration")]
+
+
+def _figure(found: Identified, stem: Path) -> Path:
+    fit = found.fit
+    drawn: list[Drawn] = []
+    for part in fit.parts:
+        width = band(fit, part, part.data, part.jacobian)
+        held = (part.held.at, part.held.values, part.held_fitted)
+        data = part.data
+        one = Drawn(part.experiment.name, data.labels, data.series, data.at, data.values, part.fitted, width, held)
+        drawn.append(one)
+    return identify_figure(drawn, fit.names, found.intervals.correlation, stem)

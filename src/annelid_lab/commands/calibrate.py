@@ -1,0 +1,86 @@
+"""The command `calibrate`: identifies a robot from measured experiments."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from annelid.cli import (
+    Assignments,
+    Force,
+    Jobs,
+    Output,
+    Quiet,
+    SchedulerAddress,
+    command,
+    complain,
+    kept_runs,
+    overrides_of,
+    print_results,
+    refuse_existing,
+    refuse_json,
+)
+
+
+@command("calibrate", "Robot")
+def calibrate_command(
+    study: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="[STUDY.toml]",
+            help="Worm, parameters and experiments; --example prints one.  [default: the robot of annelid's data]",
+        ),
+    ] = None,
+    output: Output = Path("calibration"),
+    assignments: Assignments = None,
+    free: Annotated[
+        list[str] | None,
+        typer.Option(metavar="PARAMETER", help="Fit only these; may be repeated.  [default: those of the study]"),
+    ] = None,
+    jobs: Jobs = None,
+    scheduler: SchedulerAddress = None,
+    example: Annotated[bool, typer.Option("--example", help="Print the study of the robot, to begin with.")] = False,
+    quiet: Quiet = False,
+    force: Force = False,
+) -> None:
+    """Identify a robot from several measured experiments at once.
+
+    A study names a worm, parameters with their bounds, and experiments with their data, beside it or below it:
+
+    \b
+    tensile       force over the elongation of the strands' tube
+    load-frame    force over the displacement of a ring's cable, there and back
+    ring-down     a strand that is bent, released, and rings down
+    walk          the log of a walking robot, with a map, as annelid compare takes it
+
+    Writes calibration.json, with values, 95 % intervals, correlations and the size of what the model leaves out;
+    calibration.png and .svg; and calibrated.toml, the fitted worm. Tests of worms are kept, so the same command
+    continues one that was interrupted. A study with a load frame takes some minutes. Without a study, the tube and
+    one segment of the robot are fitted.
+
+    \b
+    annelid calibrate --example > study.toml
+    annelid calibrate study.toml -o mine
+    annelid calibrate --free young_modulus --free spring_rate --free dry_friction --free cable_friction
+    annelid run mine/calibrated.toml --uncertainty 8 --uncertainty-from mine/calibration.json
+    """
+    from annelid_lab.calibration.report import REPORT, identify, tables, write_identified
+    from annelid_lab.calibration.simulations import Simulations
+    from annelid_lab.calibration.study import ROBOT, load_identify_study
+
+    refuse_json(example, "--example")
+    if example:
+        typer.echo(ROBOT.read_text(encoding="utf-8"), nl=False)
+        return
+    source = ROBOT if study is None else study
+    loaded = load_identify_study(source).but(overrides_of(assignments))
+    loaded = loaded.only(free) if free else loaded
+    with kept_runs(output, jobs=jobs, scheduler=scheduler, quiet=quiet) as store:
+        refuse_existing(output / REPORT, force)
+        simulations = Simulations(store.folder, store.executor, store.progress)
+        found = identify(loaded, source.parent, simulations, lambda note: complain(f"note: {note}"))
+    for sentence in found.intervals.confused:
+        complain(f"note: {sentence}")
+    print_results(write_identified(found, output), *tables(found), quiet=quiet)

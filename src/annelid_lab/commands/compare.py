@@ -1,0 +1,120 @@
+"""The command `compare`: runs side by side, or a run and a measured log."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from annelid.cli import Force, command, complain, give, lock, play, print_paths, refuse_existing
+from annelid.errors import RunFileError
+
+
+@command("compare", "Robot")
+def compare_command(
+    runs: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="RUN RUN..",
+            help="Folders of runs, or their run.nc; differences are to the first. With --map: a run and a table.",
+        ),
+    ],
+    log_map: Annotated[
+        Path | None,
+        typer.Option("--map", metavar="MAP.toml", help="Compare with measured data: what the table's columns are."),
+    ] = None,
+    from_time: Annotated[
+        float, typer.Option(help="With --map: time of the run before which nothing is compared, s.")
+    ] = 0.0,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="Folder for the figures and comparison.json  [default: only print]"),
+    ] = None,
+    potentials: Annotated[bool, typer.Option("--potentials", help="Draw the potentials of the neurons too.")] = False,
+    view: Annotated[
+        bool, typer.Option("--view", help="With --map: play the run in the browser, with the log beside it.")
+    ] = False,
+    force: Force = False,
+) -> None:
+    """Lay runs side by side: numbers, differences, figures.
+
+    Prints the numbers of every run with their differences to the first, and the fields in which the configurations
+    differ. What a run lacks is a dash, so worms of any kinds can be compared. With -o it draws all runs into one
+    figure each: lengths.png, travel.png, and potentials.png with --potentials.
+
+    \b
+    annelid compare runs/riddle2023-rods-001 runs/riddle2023-rods-002
+    annelid compare runs/riddle2023-rods-001 runs/riddle2022-planar-001 -o comparison
+    annelid compare runs/* --json | jq .numbers.period_s
+    annelid compare runs/wang-001 robot.csv --map robot.toml -o robot
+    annelid compare runs/wang-001 robot.csv --map robot.toml --view
+
+    With --map the second file is a measured log: CSV, Parquet, MATLAB, netCDF, or the points of a video tracker.
+    Both are aligned in time, and every signal's error, amplitude, phase and duty are printed; -o adds
+    agreement.json and agreement.png. docs/how_to/measured_data.md describes map and numbers.
+    """
+    if log_map is not None:
+        _compare_measured(runs, log_map, from_time, output, force=force, view=view)
+        return
+    if view:
+        raise typer.BadParameter("--view needs --map: annelid view RUN plays a run alone")
+    from annelid.analysis import compare
+    from annelid.draw import comparison_table, fields_table, lengths_figure, potentials_figure, travel_figure
+    from annelid.output import write_json
+    from annelid.simulation import open_run
+    from annelid.terminal import Console
+
+    if len(runs) < 2:
+        raise typer.BadParameter("name at least two runs to compare")
+    if potentials and output is None:
+        raise typer.BadParameter("--potentials draws a figure, so it needs a folder: -o FOLDER")
+    figures = {"lengths.png": lengths_figure, "travel.png": travel_figure}
+    if potentials:
+        figures["potentials.png"] = potentials_figure
+    if output is not None:
+        lock(output)
+        for name in ("comparison.json", *figures):
+            refuse_existing(output / name, force)
+    opened = [open_run(run) for run in runs]
+    comparison = compare(opened)
+    if not give(comparison.to_dict()):
+        Console().print(comparison_table(comparison))
+        Console().print(fields_table(comparison) if comparison.fields else "the configurations are the same")
+    if output is None:
+        return
+    written = [write_json(output / "comparison.json", comparison.to_dict())]
+    for name, draw in figures.items():
+        try:
+            written.append(draw(opened, comparison.labels, output / name))
+        except RunFileError as error:
+            complain(f"{name} not drawn: {error}")
+    print_paths(written)
+
+
+def _compare_measured(
+    files: list[Path], log_map: Path, from_s: float, output: Path | None, *, force: bool, view: bool
+) -> None:
+    from annelid.output import write_json
+    from annelid.simulation import open_run
+    from annelid.terminal import Console
+    from annelid_lab.logs import compare_with_log, read_map, read_measured
+    from annelid_lab.logs.report import agreement_figure, agreement_table, measured_plots
+
+    if len(files) != 2:
+        raise typer.BadParameter("--map compares one run with one measured table: name both")
+    if output is not None:
+        lock(output)
+        for name in ("agreement.json", "agreement.png"):
+            refuse_existing(output / name, force)
+    run = open_run(files[0])
+    found = compare_with_log(run, read_measured(files[1], read_map(log_map)), from_s=from_s)
+    if not give(found.to_dict()):
+        Console().print(agreement_table(found))
+    for note in found.notes:
+        complain(f"note: {note}")
+    if output is not None:
+        print_paths([write_json(output / "agreement.json", found.to_dict())])
+        print_paths([agreement_figure(found, output / "agreement")])
+    if view:
+        play(run, plots=measured_plots(found))

@@ -1,0 +1,218 @@
+"""The commands `loop` and `pseudo-robot`."""
+
+from __future__ import annotations
+
+import math
+import time
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from annelid.cli import (
+    EXIT_INTERRUPTED,
+    EXIT_STOPPED,
+    Assignments,
+    NamedPreset,
+    Segments,
+    command,
+    complain,
+    config_of,
+    locked_folder,
+    overrides_of,
+    print_paths,
+    print_results,
+    print_run,
+    wants_json,
+)
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+_LINE = "a serial port as PORT@BAUD, or udp:HOST:PORT"
+Ticks = Annotated[
+    tuple[int, int],
+    typer.Option(metavar="RELAXED CONTRACTED", help="Servo positions at activation 0 and 1, of 0 .. 4095."),
+]
+Potentiometer = Annotated[
+    tuple[float, float],
+    typer.Option(metavar="COUNTS M_PER_COUNT", help="Reading of a potentiometer at rest, and m per count."),
+]
+_TICKS, _POTENTIOMETER = (1024, 3072), (512.0, 0.3 / 4095)
+
+
+@command("loop", "Robot")
+def loop_command(
+    preset: NamedPreset,
+    robot: Annotated[
+        str | None, typer.Option(metavar="LINE", help=f"A robot that speaks annelid's protocol: {_LINE}.")
+    ] = None,
+    servos: Annotated[
+        str | None,
+        typer.Option(
+            metavar="LINE", help="A robot of servos in the manner of Dynamixel 2.0: a serial port as PORT@BAUD."
+        ),
+    ] = None,
+    firmware: Annotated[
+        str | None, typer.Option(metavar="LINE", help=f"A controller that speaks annelid's protocol: {_LINE}.")
+    ] = None,
+    rate: Annotated[float, typer.Option(help="Exchanges in a second.", min=1.0, max=10_000.0)] = 100.0,
+    watchdog: Annotated[
+        int, typer.Option(min=1, max=10_000, help="Stop after so many periods without a valid answer.")
+    ] = 10,
+    least: Annotated[float, typer.Option(help="Least activation that is sent to a robot, a share of all.")] = 0.0,
+    most: Annotated[float, typer.Option(help="Largest activation that is sent to a robot, a share of all.")] = 1.0,
+    most_rate: Annotated[
+        float | None, typer.Option(help="Largest change of activation that is sent in a second  [default: no limit]")
+    ] = None,
+    ticks: Ticks = _TICKS,
+    potentiometer: Potentiometer = _POTENTIOMETER,
+    sense: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME",
+            help="What a robot senses: lengthening_m, touch_N, heading_rad or front_m; may be repeated"
+            "  [default: what the controller is given]",
+        ),
+    ] = None,
+    assignments: Assignments = None,
+    segments: Segments = None,
+    duration: Annotated[float | None, typer.Option(help="Time to run, s.")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", help="Folder for the results  [default: runs/NAME-NNN, the next free number]"),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace the run that is in the folder.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress bar and no tables.")] = False,
+) -> None:
+    """Run a robot, firmware, or both, at the pace of the wall clock, and record it as a run.
+
+    With a robot, the preset's controller drives it. With firmware, as `annelid export-network --wire` writes it, the
+    firmware drives the preset's simulated body. With both, the firmware drives the robot. Writes run.nc, for `annelid
+    show` and `annelid compare`, and loop.csv: latency and jitter, missed deadlines and lost answers.
+
+    The robot is sent zero activation and a stop at the end, on Ctrl-C, when the watchdog's time is over, and when
+    anything else goes wrong; docs/wire.md describes the protocol, and what stops it.
+
+    \b
+    annelid loop riddle2023-rods --servos /dev/ttyUSB0@1000000           a robot of servos
+    annelid loop riddle2023-rods --robot udp:192.168.1.7:4242 --rate 50  a robot with a protocol of annelid's
+    annelid loop riddle2023-rods --firmware /dev/ttyACM0                 a microcontroller and the simulated worm
+    annelid loop riddle2023-rods --servos /dev/ttyUSB0 --most 0.6 --most-rate 2   gently
+    """
+    from annelid.output import write_csv
+    from annelid_lab.loop import Limits, Wiring, drive, open_link
+
+    config = config_of(preset, overrides_of(assignments, duration_s=duration), segments)
+    limits = Limits(least, most, math.inf if most_rate is None else most_rate)
+    wiring = Wiring(*ticks, *potentiometer)
+    if (robot, servos, firmware) == (None, None, None):
+        raise typer.BadParameter("name what is real: --robot, --servos or --firmware; else use annelid run")
+    if servos is None and (ticks, potentiometer) != (_TICKS, _POTENTIOMETER):
+        raise typer.BadParameter("--ticks and --potentiometer are of a robot of servos: they need --servos")
+    if robot is None and servos is None and (least, most, most_rate) != (0.0, 1.0, None):
+        raise typer.BadParameter("--least, --most and --most-rate are limits of a robot: they need --robot or --servos")
+    lines = {name: text for name, text in (("robot", robot), ("servos", servos), ("firmware", firmware)) if text}
+    folder = locked_folder(out, config.name)
+    links: dict[str, Any] = {}
+    try:
+        for name, text in lines.items():
+            links[name] = open_link(text)
+        driven = drive(
+            config,
+            folder,
+            **links,
+            rate_hz=rate,
+            watchdog=watchdog,
+            limits=limits,
+            wiring=wiring,
+            senses=sense,
+            progress=False if quiet else None,
+            overwrite=force,
+        )
+    finally:
+        for link in links.values():
+            link.close()
+    run = driven.run
+    print_run(run, quiet=quiet)
+    if not wants_json():
+        print_paths([run.path])
+    rows = _rows(driven.report)
+    times = write_csv(run.path.with_name("loop.csv"), list(rows[0]), [list(row.values()) for row in rows])
+    print_results([times], _table(driven.report, rows), quiet=quiet)
+    if run.status != "complete":
+        complain(f"{run.message}; what was recorded is in {run.path}")
+        raise typer.Exit(EXIT_INTERRUPTED if run.status == "interrupted" else EXIT_STOPPED)
+
+
+def _rows(report: dict[str, Any]) -> list[dict[str, Any]]:
+    """Times of commands and answers, in s, as records."""
+    there = [(who, report[who]) for who in ("robot", "firmware") if who in report]
+    found = [
+        ("command late", report["missed_deadlines"], report["lateness_s"]),
+        *((f"answer of the {who}", its["lost"], its["latency_s"]) for who, its in there),
+    ]
+    return [
+        {"what": what, "periods": report["periods"], "missed": n, **{f"{name}_s": each for name, each in times.items()}}
+        for what, n, times in found
+    ]
+
+
+def _table(report: dict[str, Any], rows: list[dict[str, Any]]) -> Table:
+    from rich.table import Table
+
+    title = f"{report['periods']} periods of {1e3 / report['rate_hz']:g} ms, times in ms"
+    table = Table("", "missed, lost", "median", "99 %", "99.9 %", "largest", title=title, title_justify="left")
+    for row in rows:
+        times = [row[name] for name in ("median_s", "p99_s", "p99_9_s", "max_s")]
+        table.add_row(
+            row["what"], str(row["missed"]), *("-" if each is None else f"{1e3 * each:.3f}" for each in times)
+        )
+    return table
+
+
+@command("pseudo-robot", "", as_json=False)
+def pseudo_robot_command(
+    preset: NamedPreset,
+    reach: Annotated[float, typer.Option(help="Lengthening of a segment that is contracted fully, m.")] = 0.06,
+    lag: Annotated[float, typer.Option(help="Time constant of a servo with its segment, s.", min=1e-3)] = 0.15,
+    noise: Annotated[float, typer.Option(help="Standard deviation of a potentiometer's noise, m.", min=0.0)] = 0.0005,
+    latency: Annotated[float, typer.Option(help="Time from a packet to its answer, s.", min=0.0, max=10.0)] = 0.001,
+    seed: Annotated[int, typer.Option(help="Seed of the noise.", min=0)] = 0,
+    ticks: Ticks = _TICKS,
+    potentiometer: Potentiometer = _POTENTIOMETER,
+    segments: Segments = None,
+    duration: Annotated[float | None, typer.Option(help="End after so long, s  [default: go on until Ctrl-C]")] = None,
+) -> None:
+    """Simulate a robot of servos behind a pseudo-terminal, to try `annelid loop` without hardware.
+
+    It has the segments and muscles of the preset. Servos answer in the manner of Dynamixel's protocol 2.0 and follow
+    their goals with a lag; potentiometers have noise and steps. Prints the path of the terminal and serves it.
+
+    \b
+    annelid pseudo-robot riddle2023-rods                     prints, for example, /dev/pts/5
+    annelid loop riddle2023-rods --servos /dev/pts/5         in another terminal
+    """
+    from annelid.errors import require_finite, require_positive
+    from annelid.simulation import build_plant
+    from annelid_lab.loop import PseudoRobot, Wiring, serve_terminal
+
+    if duration is not None:
+        require_finite(duration=duration)
+        require_positive(duration=duration)
+    body = build_plant(config_of(preset, {}, segments))
+    wiring = Wiring(*ticks, *potentiometer)
+    robot = PseudoRobot(
+        body.n_segments,
+        body.n_muscles,
+        reach_m=reach,
+        lag_s=lag,
+        noise_m=noise,
+        latency_s=latency,
+        seed=seed,
+        wiring=wiring,
+    )
+    end = math.inf if duration is None else time.monotonic() + duration
+    # At once, also into a pipe, since the command goes on.
+    serve_terminal(robot, lambda: time.monotonic() >= end, partial(print, flush=True))

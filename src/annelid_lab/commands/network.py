@@ -1,0 +1,116 @@
+"""The command `export-network`: networks and controllers for other programs and microcontrollers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from annelid.cli import Assignments, Force, Segments, command, config_of, overrides_of, print_paths, refuse_existing
+from annelid.errors import shown, suggest
+
+
+@command("export-network", "")
+def export_network_command(
+    source: Annotated[
+        str,
+        typer.Argument(metavar="PRESET|FILE", help="A preset, a configuration, or a network as TOML or LEMS (.xml)."),
+    ],
+    to: Annotated[str, typer.Option(metavar="FORMAT", help="c, lems or toml.")] = "c",
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="Folder of c, or file  [default: firmware, network.xml or network.toml]"),
+    ] = None,
+    single: Annotated[
+        bool, typer.Option("--float/--double", help="Type of all numbers in the C code.", show_default="double")
+    ] = False,
+    assignments: Assignments = None,
+    segments: Segments = None,
+    timestep_ms: Annotated[
+        float | None,
+        typer.Option("--timestep-ms", help="Step of a network, ms  [default: 1, in LEMS 0.1; a preset has its own]"),
+    ] = None,
+    scheme: Annotated[
+        str | None, typer.Option(help="Scheme of a network in C: euler, toolbox or heun  [default: euler]")
+    ] = None,
+    wire: Annotated[
+        bool, typer.Option("--wire", help="Also write what answers `annelid loop` over a serial line or UDP.")
+    ] = False,
+    force: Force = False,
+) -> None:
+    """Write a network for other programs, or a worm's whole controller for a microcontroller.
+
+    \b
+    c     C99: of a preset or a configuration the controller with its sensors' thresholds, its start, its turning and
+          the muscles' activation; of a network from the currents of its inputs to the potentials of its outputs.
+          A header, a source file and a self-test
+    lems  LEMS, the language of NeuroML 2, for pyLEMS and jNeuroML: the network alone, of a preset too
+    toml  the network alone as Network.to_toml writes it; reads LEMS files that annelid wrote
+
+    \b
+    annelid export-network riddle2022-planar -o firmware
+    annelid export-network riddle2023-rods -o firmware --float
+    annelid export-network riddle2023-rods -o firmware --float --wire
+    annelid export-network network.toml -o firmware --timestep-ms 0.5
+    annelid export-network riddle2023-rods --to lems -o network.xml
+    annelid export-network network.xml --to toml
+    """
+    from typing import cast
+
+    from annelid.config import preset_names
+    from annelid.nervous import Network, Scheme
+    from annelid.output import with_suffix, write_text
+    from annelid.simulation import build_controller, build_plant
+    from annelid.textfiles import read_text, read_toml
+    from annelid_lab.firmware import controller_firmware, controller_network, network_firmware
+    from annelid_lab.lems import lems_text, read_lems
+
+    files = {"c": "firmware", "lems": "network.xml", "toml": "network.toml"}
+    if to not in files:
+        raise typer.BadParameter(f"--to {shown(to)}: {suggest(to, files)}")
+    path = Path(source)
+    is_file = source not in preset_names() and path.is_file()
+    is_lems = is_file and path.suffix == ".xml" and "<Lems" in read_text(path)
+    is_network = is_lems or (is_file and path.suffix != ".xml" and "neuron" in read_toml(path))
+    other = to != "c" and f"the network as {to}"
+    controller = not is_network and "a controller, which has the step and the scheme of its configuration"
+    for option, value, reason in (
+        ("--set", assignments, is_network and "a network"),
+        ("--segments", segments, is_network and "a network"),
+        ("--timestep-ms", timestep_ms, other if to == "toml" else to == "c" and controller),
+        ("--scheme", scheme, other or controller),
+        ("--float", single or None, other),
+        ("--wire", wire or None, other),
+    ):
+        if value is not None and reason:
+            raise typer.BadParameter(f"{option} has no effect on {reason}")
+    target = output or Path(files[to])
+    if to != "c":
+        target = with_suffix(target, (Path(files[to]).suffix,), to, default=Path(files[to]).suffix)
+    real = "float" if single else "double"
+    name, worm = "", None
+    if is_network:
+        network = read_lems(path) if is_lems else Network.from_toml(read_text(path))
+    else:
+        config = config_of(source, overrides_of(assignments), segments).model_copy(update={"trial": None})
+        name, worm = config.name, build_controller(config, build_plant(config))
+        network = controller_network(worm)
+    if to != "c":
+        refuse_existing(target, force)
+        text = (
+            network.to_toml()
+            if to == "toml"
+            else lems_text(network, timestep_ms=0.1 if timestep_ms is None else timestep_ms)
+        )
+        print_paths([write_text(target, text)])
+        return
+    if worm is None:
+        step_ms = 1.0 if timestep_ms is None else timestep_ms
+        firmware = network_firmware(network, step_ms, cast(Scheme, scheme or "euler"), real=real)
+    else:
+        firmware = controller_firmware(worm, name, real=real)
+    for written in firmware.paths(target, wire=wire):
+        if written.exists():
+            refuse_existing(written, force)
+    print_paths(firmware.write(target, overwrite=force, wire=wire))

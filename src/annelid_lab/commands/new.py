@@ -1,0 +1,44 @@
+"""The command `new`: a worm of one's own size."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from annelid.cli import Force, command, print_paths, refuse_existing
+
+
+@command("new", "Make")
+def new_command(
+    path: Annotated[Path, typer.Argument(metavar="FILE.toml", help="The file to write.")],
+    radius: Annotated[float, typer.Option(help="Radius of the tube at rest, m.")] = 0.16,
+    segments: Annotated[int, typer.Option(help="Segments, from 3 on.")] = 3,
+    helices: Annotated[int, typer.Option(help="Strands, half of each handedness; even, from 6 on.")] = 12,
+    length: Annotated[
+        float | None, typer.Option(help="Length at rest, m.  [default: so that rhombi have the paper's shape]")
+    ] = None,
+    rear_radius: Annotated[
+        float | None, typer.Option(help="Radius of the last ring at rest, m.  [default: as --radius, no taper]")
+    ] = None,
+    force: Force = False,
+) -> None:
+    """Write the configuration of a worm of your own size.
+
+    Strands, springs, muscles, sensors, times and limits follow from the geometry, so that the worm moves as the paper's
+    robot of rods does; the file states the rule of each. Replace what you can measure. A geometry that cannot work is
+    refused here.
+
+    \b
+    annelid new mine.toml --radius 0.05 --segments 5 --helices 8 --length 0.4
+    annelid new taper.toml --radius 0.05 --rear-radius 0.04
+    annelid run mine.toml
+    """
+    from annelid.output import write_text
+    from annelid_lab.similar import worm_text
+
+    if path.suffix != ".toml":
+        raise typer.BadParameter(f"{path} must end in .toml")
+    refuse_existing(path, force, "")
+    print_paths([write_text(path, worm_text(radius, segments, helices, length, rear_radius))])

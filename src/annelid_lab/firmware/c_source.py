@@ -1,0 +1,492 @@
+"""The C99 of a network or a controller: tables and statements, put into the templates beside this module."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from importlib.metadata import version
+from importlib.resources import files
+from pathlib import Path
+from string import Template
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from annelid.control import SENSED, ControllerCode
+from annelid.errors import ConfigError, RunFileError
+from annelid.nervous import NO_GATE, Factors, Network, NetworkState, Scheme
+from annelid.output import write_text
+from annelid.text import numbered
+
+Real = Literal["double", "float"]
+LONGEST_NAME = 24
+"""Characters of the name with which everything global begins; C99 promises 31 of a whole one."""
+LONGEST_LABEL = 40
+N_BLOCKS, STEPS = 16, 300
+"""Of the self-test: blocks under one sensation each, and steps of a block."""
+MOST_LATE = 4
+TOLERANCES = {"double": (1e-6, 0), "float": (0.1, MOST_LATE)}
+"""Of the self-test, by type: of potentials, mV, and by how many steps one may be late."""
+_SCHEMES: dict[Scheme, str] = {
+    "euler": "forward Euler",
+    "toolbox": "forward Euler, gates before potentials",
+    "heun": "Heun's method",
+}
+_INTERFACE = re.compile(r"\b(EXP|POW|FMOD|ATAN2)\(")
+_UNSAFE = re.compile(r"[^A-Za-z0-9 _.,:;()+=-]")
+
+
+@dataclass(frozen=True)
+class Firmware:
+    """C99 of a network or a controller, and what a program on this machine needs to know of it.
+
+    Attributes:
+        name: What its files are called and everything global in them begins with.
+        header: Text of ``name.h``.
+        source: Text of ``name.c``.
+        self_test: Text of ``name_selftest.c``.
+        real: Type of all numbers.
+        sensors: Names and shapes of what a step is given, in the order in the struct, which has nothing else.
+        returned: Name and length of what it returns.
+        neurons: Names of the neurons, in the order in ``potential_mV``, with which the struct of the state begins.
+        wire: Of a controller: texts of ``name_wire.h`` and ``name_wire.c``, which answer annelid over a line.
+    """
+
+    name: str
+    header: str
+    source: str
+    self_test: str
+    real: Real
+    sensors: Mapping[str, tuple[int, ...]]
+    returned: tuple[str, int]
+    neurons: tuple[str, ...]
+    wire: tuple[str, ...] = ()
+
+    def paths(self, folder: Path, *, wire: bool = False) -> list[Path]:
+        """Returns where `write` writes."""
+        endings = (".h", ".c", "_selftest.c", *(("_wire.h", "_wire.c") if wire else ()))
+        return [folder / f"{self.name}{ending}" for ending in endings]
+
+    def write(self, folder: str | Path, *, overwrite: bool = False, wire: bool = False) -> list[Path]:
+        """Writes the three files, and those of the wire if asked for, into a folder, which is made if it is not there.
+
+        Returns:
+            Their paths.
+
+        Raises:
+            ConfigError: The wire of what has none is asked for.
+            RunFileError: A file exists, unless it may be overwritten, or cannot be written.
+        """
+        if wire and not self.wire:
+            raise ConfigError(
+                "only a whole controller answers over the wire, not a network alone, and none of more than 256 numbers"
+            )
+        folder = Path(folder)
+        paths = self.paths(folder, wire=wire)
+        for path in paths:
+            if path.exists() and not overwrite:
+                raise RunFileError(f"{path} exists: name another folder, or allow to overwrite it")
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise RunFileError(f"cannot make the folder {folder}: {error.strerror}") from None
+        texts = (self.header, self.source, self.self_test, *(self.wire if wire else ()))
+        return [write_text(path, text) for path, text in zip(paths, texts, strict=True)]
+
+
+@dataclass(frozen=True, slots=True)
+class Vectors:
+    """What the self-test compares: sensors of every block, and potentials and what is returned at its end."""
+
+    sensed: list[dict[str, NDArray[Any]]] = field(default_factory=list)
+    potential: list[NDArray[Any]] = field(default_factory=list)
+    returned: list[NDArray[Any]] = field(default_factory=list)
+
+    def add(self, sensed: dict[str, NDArray[Any]], potential: ArrayLike, returned: ArrayLike) -> None:
+        """Adds a block with what was there after each of its steps, of which the last few are kept."""
+        self.sensed.append(sensed)
+        for kept, values in ((self.potential, potential), (self.returned, returned)):
+            kept.append(np.array(values)[-MOST_LATE - 1 :])
+
+
+def identifier(text: str, longest: int = LONGEST_LABEL) -> str:
+    """Returns the letters, digits and underscores of a text, with an underscore for every other character."""
+    return re.sub(r"[^A-Za-z0-9_]", "_", text)[:longest] or "_"
+
+
+def comment(text: str) -> str:
+    """Returns a text as it may stand in a comment: no character that could end it, or that a compiler replaces."""
+    return _UNSAFE.sub("_", text)[: LONGEST_LABEL * 2]
+
+
+class Writer:
+    """Fills the templates with one network and controller."""
+
+    def __init__(
+        self,
+        code: ControllerCode,
+        start: NetworkState,
+        real: Real,
+        title: str,
+        vectors: Vectors,
+    ) -> None:
+        self._network, self._stepper, self._start = code.network, code.stepper, start
+        self._code, self._vectors = code, vectors
+        self._real: Real = real
+        self._title = comment(title)
+        name = identifier(title.strip(), LONGEST_NAME).strip("_").lower() or "network"
+        self._name = name if name[0].isalpha() else f"n{name}"[:LONGEST_NAME]
+        self._tables: list[str] = []
+
+    def firmware(self, returned: str, n_returned: int) -> Firmware:
+        """Returns the three texts."""
+        # Also names the tables, and whether there is any of each sort of things.
+        words = self._network_words() | self._interface_words(returned, n_returned)
+        header = filled("firmware.h.txt", words)
+        body = filled("firmware.c.txt", words | {"includes": "", "macros": "", "functions": ""})
+        used = sorted(set(_INTERFACE.findall(body)))
+        words["includes"] = "#include <math.h>\n" if used or "INFINITY" in body else ""
+        suffix = "f" if self._real == "float" else ""
+        words |= {
+            "macros": "".join(f"#define {macro} {macro.lower()}{suffix}\n" for macro in used),
+            "functions": f" but {', '.join(macro.lower() + suffix for macro in used)}" if used else "",
+        }
+        sensors = {name: np.shape(value) for name, value in self._vectors.sensed[0].items()}
+        source, self_test = filled("firmware.c.txt", words), filled("firmware_selftest.c.txt", words)
+        return Firmware(
+            self._name,
+            header,
+            source,
+            self_test,
+            self._real,
+            sensors,
+            (returned, n_returned),
+            self._stepper.arrays.neurons,
+        )
+
+    # What the templates have of the network.
+
+    @cached_property
+    def _gates(self) -> list[tuple[int, int]]:
+        """Slot and channel of every gate that is there, slow ones first."""
+        rows = enumerate(self._stepper.arrays.gates)
+        return [(slot, channel) for slot, row in rows for channel, gate in enumerate(row) if gate != NO_GATE]
+
+    def _network_words(self) -> dict[str, Any]:
+        a, stepper = self._stepper.arrays, self._stepper
+        n, n_channels, n_terminals = len(a.neurons), len(a.channel_neuron), len(a.terminal_neuron)
+        gates = self._gates
+        slow = [(slot, channel) for slot, channel in gates if slot < a.n_slow]
+        at = {kind: part.start for kind, part in a.drive.items()}
+        affine = [n_terminals + slot * n_channels + channel for slot, channel in gates]
+        powers = np.array([a.gates[slot][channel].power for slot, channel in gates])
+        plain = bool((powers == 1.0).all())
+        pairs = plain and n_channels > 0 and len(a.gates) == 2 and a.n_slow == 1 and len(gates) == 2 * n_channels
+        whole = bool(np.isin(powers, np.arange(9)).all())
+
+        if n_terminals:
+            self._table("terminal_neuron", a.terminal_neuron, "presynaptic neurons of the terminals")
+            self._table("terminal_slope", stepper.affine_slope[:n_terminals], "one over their operating ranges, 1/mV")
+            self._table("terminal_offset", stepper.affine_offset[:n_terminals])
+        if gates:
+            self._table("gate_neuron", a.channel_neuron[[channel for _, channel in gates]], "neurons of the gates")
+            self._table("gate_slope", stepper.affine_slope[affine], "half their slopes, negative, 1/mV")
+            self._table("gate_offset", stepper.affine_offset[affine])
+            if not pairs:
+                self._table("gate_channel", np.array([channel for _, channel in gates]), "channels of the gates")
+            if not plain:
+                self._table("gate_power", powers.astype(int) if whole else powers, "exponents of the gates")
+        if slow:
+            rates = [stepper.gate_rate[slot, 0, channel] for slot, channel in slow]
+            self._table("gate_rate", np.array(rates), "step over time constant of the slow gates")
+        factors = {
+            "gate_factors": self._gate_factors(slow),
+            "channel_factors": _pairs(stepper.channel_factors),
+            "leak_factors": _pairs(stepper.leak_factors),
+            "membrane_factors": _pairs(stepper.membrane_factors),
+        }
+        if a.modulated:
+            self._sparse("modulation", a.log_modulation.T, "terminal", {"log": a.log_modulation.T})
+        for name, pairs_of in factors.items():
+            if len(pairs_of):
+                self._table(name[:-1], pairs_of, "what is modulated, and the column of its factor")
+        if len(factors["leak_factors"]):
+            modulated = factors["leak_factors"][:, 0]
+            self._table("leak_step", stepper.leak_step[modulated], "leak times step over capacitance")
+            self._table("leak_rest", a.rest_mV[modulated])
+        if len(a.rectified_source):
+            self._table("rectified_source", a.rectified_source, "higher sides of rectified gap junctions")
+            self._table("rectified_target", a.rectified_target)
+        if len(a.firing_neuron):
+            self._table("firing_neuron", a.firing_neuron, "neurons that spike")
+            self._table("firing_rest", a.rest_mV[a.firing_neuron])
+            self._table("threshold_rate", stepper.threshold_rate, "step over time constant of the thresholds")
+            self._table("threshold_start", a.threshold_mV)
+            self._table("adaptation", a.adaptation)
+            self._table("reset", a.reset_mV, "potentials after a spike")
+        if len(a.release_source):
+            self._table("release_source", a.release_source, "which of these makes each release")
+            self._table("release_decay", stepper.release_decay)
+            self._table("release_increment", a.release_increment)
+        is_sparse = self._weights(stepper.weights, n)
+        raised = "raised(%s, gate_power[i])" if whole else "POW(%s, gate_power[i])"
+        slow_power, instant_power = "gate[i]", "1 / gate_sum[i]"
+        if not plain:
+            slow_power, instant_power = raised % slow_power, raised % instant_power
+        counts = {
+            "n_neurons": n,
+            "n_drive": len(stepper.weights),
+            "n_terminals": n_terminals,
+            "n_channels": n_channels,
+            "n_gates": len(gates),
+            "n_slow": len(slow),
+            "n_modulated": len(a.modulated),
+            "n_rectified": len(a.rectified_source),
+            "n_firing": len(a.firing_neuron),
+            "n_releases": len(a.release_source),
+            **{f"n_{name}": len(pairs_of) for name, pairs_of in factors.items()},
+        }
+        flags = {
+            "terminals": n_terminals,
+            "gates": gates,
+            "slow": slow,
+            "instant": len(gates) > len(slow),
+            "heun": stepper.scheme == "heun",
+            "toolbox": stepper.scheme == "toolbox",
+            "gates_last": slow and stepper.scheme != "toolbox",
+            "modulated": a.modulated,
+            "raised": not plain and whole,
+            "nothing_seen": not n_terminals and not gates,
+            "pairs": pairs,
+            "products": n_channels and not pairs,
+            "rectified": len(a.rectified_source),
+            "potentials": a.drive["potentials"].stop > at["potentials"],
+            "firing": len(a.firing_neuron),
+            "releases": len(a.release_source),
+            "sparse": is_sparse,
+            "dense": not is_sparse,
+            **{name: len(pairs_of) for name, pairs_of in factors.items()},
+        }
+        drive_words = ", ".join(kind for kind, part in a.drive.items() if part.stop > part.start)
+        return {
+            **{name: bool(flag) for name, flag in flags.items()},
+            **counts,
+            **{f"at_{kind}": start for kind, start in at.items()},
+            "slow_power": slow_power,
+            "instant_power": instant_power,
+            "drive_words": drive_words,
+            "gate_parameter": ", const real *gate" if slow else "",
+            "gate_now": ", now.gate" if slow else "",
+            "gate_ahead": ", gate_ahead" if slow else "",
+            "tables": "\n".join(self._tables),
+            "neurons": self._labelled("NEURON", a.neurons, [_of_neuron(self._network, name) for name in a.neurons]),
+            "size": f"{n} neurons, {len(self._network.connections)} connections, currents by a "
+            f"{'sparse' if is_sparse else 'dense'} table.",
+        }
+
+    def _gate_factors(self, slow: Sequence[tuple[int, int]]) -> NDArray[np.intp]:
+        """Slow gates that are modulated, each with the column of its factor."""
+        column = dict(_pairs(self._stepper.gate_factors).tolist())
+        found = [(place, column[channel]) for place, (_, channel) in enumerate(slow) if channel in column]
+        return np.array(found, dtype=np.intp).reshape(-1, 2)
+
+    def _weights(self, weights: NDArray[np.float64], n: int) -> bool:
+        """Writes the weights in the smaller form, and returns whether that is the sparse one."""
+        conductance, current = weights[:, :n].T, weights[:, n:].T
+        used = (conductance != 0.0) | (current != 0.0)
+        number = 8 if self._real == "double" else 4
+        index = _index_type(max(len(weights), int(used.sum())))[1]
+        is_sparse = int(used.sum()) * (2 * number + index) + (n + 1) * index < weights.size * number
+        if is_sparse:
+            self._sparse("drive", used, "source", {"conductance": conductance, "current": current})
+        else:
+            self._table("drive_conductance", conductance, "dt / C times conductances, by neuron and drive")
+            self._table("drive_current", current, "dt / C times currents")
+        return is_sparse
+
+    def _sparse(self, name: str, used: NDArray[Any], column: str, values: Mapping[str, NDArray[Any]]) -> None:
+        """Writes the entries of each row that are used, one row after the other."""
+        rows, columns = np.nonzero(used)
+        first = np.searchsorted(rows, np.arange(len(used) + 1))
+        self._table(
+            f"{name}_first", first, f"where the entries of each {'neuron' if name == 'drive' else 'factor'} begin"
+        )
+        self._table(f"{name}_{column}", columns)
+        for value, dense in values.items():
+            self._table(f"{name}_{value}", dense[rows, columns], "times dt / C" if name == "drive" else "")
+
+    def _table(self, name: str, values: ArrayLike, meaning: str = "") -> None:
+        array = np.asarray(values)
+        kind = "real" if array.dtype.kind == "f" else _index_type(int(array.max(initial=0)))[0]
+        shape = "".join(f"[{length}]" for length in array.shape)
+        if meaning:
+            self._tables.append(f"/* {meaning[0].upper()}{meaning[1:]}. */")
+        self._tables.append(f"static const {kind} {name}{shape} = {self._values(array)};")
+
+    def _values(self, values: ArrayLike) -> str:
+        """Numbers as C writes them, in braces for every dimension."""
+        array = np.asarray(values)
+        if array.ndim == 0:
+            return self._number(array.item())
+        if array.ndim > 1:
+            return "{\n" + ",\n".join(f"    {self._values(row)}" for row in array) + "\n}"
+        lines = [""]
+        for text in map(self._number, array.tolist()):
+            if len(lines[-1]) + len(text) > 100:
+                lines.append("")
+            lines[-1] += f" {text},"
+        return ("{" + "\n   ".join(lines)).removesuffix(",") + " }"
+
+    def _number(self, value: float | bool) -> str:
+        if isinstance(value, bool | int):
+            return str(int(value))
+        if abs(value) == np.inf:
+            return "INFINITY" if value > 0 else "-INFINITY"
+        if self._real == "double":
+            return repr(value)
+        with np.errstate(over="ignore"):
+            single = np.float32(value)
+        if not np.isfinite(single):
+            raise ConfigError(f"{value:g} is too large for float: export in double")
+        text = str(single)
+        return f"{text if '.' in text or 'e' in text else text + '.0'}f"
+
+    def _labelled(self, kind: str, names: Sequence[str], meanings: Sequence[str]) -> str:
+        """Lines of an enumeration."""
+        labels = numbered(map(identifier, names))
+        lines = zip(labels, names, meanings, strict=True)
+        prefix = f"{self._name.upper()}_{kind}"
+        return "\n".join(f"    {prefix}_{label}, /* {comment(name)}: {meaning} */" for label, name, meaning in lines)
+
+    # What they have of the controller.
+
+    def _interface_words(self, returned: str, n_returned: int) -> dict[str, Any]:
+        code, network, name = self._code, self._network, self._name
+        prefix, a = name.upper(), self._stepper.arrays
+        targets = [", ".join(map(comment, each)) for each in network.inputs.values()]
+        is_controller = returned == "activation"
+        n_inputs = len(network.inputs)
+        real = f"{name}_real"
+        sensors = [
+            f"    {real} {field}{_lengths(value)}; /* {SENSED[field].meaning if field in SENSED else 'by input'} */"
+            for field, value in self._vectors.sensed[0].items()
+        ]
+        state = {label: np.asarray(value) for label, value in code.state.items()}
+        fields = [f"    {real} {label}{_lengths(value)};" for label, value in state.items()]
+        parts = [("potential_mV", self._start.potential[0])]
+        if self._gates and self._stepper.arrays.n_slow:
+            slow = [(slot, channel) for slot, channel in self._gates if slot < a.n_slow]
+            parts.append(("gate", np.array([self._start.gate[0, slot, channel] for slot, channel in slow])))
+        if len(a.firing_neuron):
+            parts += [("threshold_mV", self._start.threshold[0]), ("fired", self._start.fired[0].astype(int))]
+        if len(a.release_source):
+            parts.append(("release", self._start.release[0]))
+        start = [f"    {self._values(value)}, /* {label} */" for label, value in [*parts, *state.items()]]
+        constants = []
+        for label, value in code.constants.items():
+            array = np.asarray(value)
+            kind = "real" if array.dtype.kind == "f" else "unsigned long"
+            constants.append(f"static const {kind} {label}{_lengths(array)} = {self._values(array)};")
+        step = [*(["    static real input_nA[N_INPUTS];"] if is_controller and n_inputs else [])]
+        body = f"{code.inputs}\n{code.activation}"
+        step += [f"    int {letter};" for letter in "ij" if re.search(rf"\bfor \({letter} ", body)]
+        argument = "input_nA" if n_inputs else "0"
+        step += [code.inputs.strip("\n")] if code.inputs else []
+        step += [
+            f"    network_step({argument if is_controller else 'sensors->input_nA'});",
+            code.activation.strip("\n"),
+        ]
+        if not self._vectors.sensed[0]:
+            step.append("    (void)sensors;")
+        (tolerance_mV, late), vectors = TOLERANCES[self._real], self._vectors
+        potential, back = np.array(vectors.potential)[:, -late - 1 :], np.array(vectors.returned)[:, -late - 1 :]
+        sensed = ",\n".join(
+            "    {" + ", ".join(self._values(value) for value in block.values()) + "}" for block in self._vectors.sensed
+        )
+        return {
+            "title": self._title,
+            "name": name,
+            "NAME": prefix,
+            "version": version("annelid"),
+            "real": self._real,
+            "timestep_ms": repr(self._stepper.timestep_ms),
+            "scheme_words": _SCHEMES[self._stepper.scheme],
+            "inputs": self._labelled("INPUT", list(network.inputs), targets),
+            "n_inputs": n_inputs,
+            "outputs": self._labelled("OUTPUT", list(network.outputs), [comment(s) for s in network.outputs.values()]),
+            "n_outputs": len(network.outputs),
+            "sizes": f"\n#define {prefix}_N_MUSCLES {n_returned}\n" if is_controller else "",
+            "sensors": "\n".join(sensors),
+            "activation": f"    {real} {returned}[{n_returned}]; /* {_RETURNED[returned]} */",
+            "state": "\n".join(fields),
+            "start": "\n".join([*start, "    0 /* n_steps */"]),
+            "controller": is_controller,
+            "any_inputs": n_inputs > 0,
+            "no_inputs": n_inputs == 0,
+            "n_segments": code.n_segments,
+            "n_muscles": code.n_muscles,
+            "constants": "\n".join(constants),
+            "helpers": code.helpers,
+            "clipped": "clipped(" in body,
+            "step": "\n".join(step),
+            "n_steps": N_BLOCKS * STEPS,
+            "n_blocks": N_BLOCKS,
+            "steps": STEPS,
+            "n_returned": n_returned,
+            "sensed": "{\n" + sensed + "\n}",
+            "lowest_mV": self._values(potential.min(axis=1)),
+            "highest_mV": self._values(potential.max(axis=1)),
+            "lowest": self._values(back.min(axis=1)),
+            "highest": self._values(back.max(axis=1)),
+            "returned": returned,
+            "tolerance_mV": f"{tolerance_mV:g}",
+            "tolerance": f"{tolerance_mV * (0.1 if is_controller else 1.0):g}",
+            "late": f", or what they were up to {late} steps before" if late else "",
+        }
+
+
+_RETURNED = {"activation": "of every muscle, 0 .. 1", "output_mV": "by output"}
+
+
+def _lengths(value: ArrayLike) -> str:
+    return "".join(f"[{length}]" for length in np.shape(value))
+
+
+def _pairs(factors: Factors) -> NDArray[np.intp]:
+    return np.stack(factors, axis=1)
+
+
+def _index_type(most: int) -> tuple[str, int]:
+    """The smallest type of a place, and its bytes."""
+    return next(
+        kind for kind in (("unsigned char", 1), ("unsigned short", 2), ("unsigned long", 4)) if most < 256 ** kind[1]
+    )
+
+
+def _of_neuron(network: Network, name: str) -> str:
+    neuron = network.neurons[name]
+    kinds = [f"C {neuron.capacitance_nF:g} nF, Gm {neuron.leak_conductance_uS:g} uS, rest {neuron.rest_mV:g} mV"]
+    if neuron.bias_nA:
+        kinds.append(f"bias {neuron.bias_nA:g} nA")
+    if neuron.channels:
+        kinds.append(f"{len(neuron.channels)} gated channel{'s' if len(neuron.channels) > 1 else ''}")
+    if neuron.firing is not None:
+        kinds.append("spikes")
+    return ", ".join(kinds)
+
+
+def filled(template: str, words: Mapping[str, Any]) -> str:
+    """Fills a template: lines between ``@if word`` and ``@end`` stay where the word is true, ``$word`` is replaced."""
+    lines: list[str] = []
+    stays: list[bool] = []
+    for line in files("annelid_lab.firmware").joinpath(template).read_text(encoding="utf-8").splitlines():
+        if line.startswith("@if "):
+            stays.append(bool(words[line.removeprefix("@if ")]))
+        elif line == "@end":
+            stays.pop()
+        elif all(stays):
+            lines.append(Template(line).substitute(words))
+    return re.sub(r"\n{3,}", "\n\n", "\n".join(lines)) + "\n"

@@ -1,0 +1,362 @@
+"""A network as LEMS, the language that NeuroML 2 is defined in, and back.
+
+The file has one component type, whose equations are those of `annelid.nervous`, and one component with the numbers:
+its attributes are the fields of the network's TOML text, ``neuron_1_capacitance_nF="5.0nF"``. It includes no other
+file, and runs as it is in pyLEMS and jNeuroML. Cannon et al. 2014, doi:10.3389/fninf.2014.00079.
+"""
+
+from __future__ import annotations
+
+import re
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import zip_longest
+from pathlib import Path
+from typing import Any, get_args
+
+from annelid.errors import ConfigError, require_finite, require_positive, shortened, shown
+from annelid.nervous import Modulated, Network, network_of_tables, network_tables
+from annelid.text import printable
+from annelid.textfiles import parse_xml, read_bytes
+
+WHAT = "a LEMS file of a network"
+MOST_ELEMENTS, MOST_LEVELS = 200_000, 8
+"""A network of 200 segments has 32,000 elements in five levels, 4 MB."""
+DIMENSIONS = {
+    "per_mV": ("per_voltage", {"m": "-1", "l": "-2", "t": "3", "i": "1"}, "3"),
+    "mV": ("voltage", {"m": "1", "l": "2", "t": "-3", "i": "-1"}, "-3"),
+    "uS": ("conductance", {"m": "-1", "l": "-2", "t": "3", "i": "2"}, "-6"),
+    "nF": ("capacitance", {"m": "-1", "l": "-2", "t": "4", "i": "2"}, "-9"),
+    "nA": ("current", {"i": "1"}, "-9"),
+    "ms": ("time", {"t": "1"}, "-3"),
+}
+"""Dimension of every unit with which a field may end, its exponents, and the unit's power of ten."""
+LONGEST_NUMBER = 100
+TYPE, INPUT_CURRENT = "annelid_network", "current_nA"
+_SIMULATION = f"""<Lems>
+<ComponentType name="OutputColumn">
+  <Path name="quantity"/>
+  <Simulation><Record quantity="quantity"/></Simulation>
+</ComponentType>
+<ComponentType name="OutputFile">
+  <Text name="path"/><Text name="fileName"/>
+  <Children name="columns" type="OutputColumn"/>
+  <Simulation><DataWriter path="path" fileName="fileName"/></Simulation>
+</ComponentType>
+<ComponentType name="Simulation">
+  <Parameter name="length" dimension="time"/><Parameter name="step" dimension="time"/>
+  <ComponentReference name="target" type="{TYPE}"/>
+  <Children name="outputs" type="OutputFile"/>
+  <Dynamics><StateVariable name="t" dimension="time"/></Dynamics>
+  <Simulation><Run component="target" variable="t" increment="step" total="length"/></Simulation>
+</ComponentType>
+</Lems>"""
+_FLAGS = {"true": True, "false": False}
+_TEXTS = {"name", "source", "target", "kind", "quantity", "targets"}
+_KEY = re.compile(r"(neuron|connection|input|output|channels|gates|targets)_([1-9]\d{0,6})(?:_(.+))?")
+_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
+_IN_XML = re.compile("[\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]*")
+"""Characters that XML 1.0 can hold."""
+
+
+def read_lems(path: str | Path) -> Network:
+    """Reads a network from a file of the text that `lems_text` makes; numbers and names may be others, not equations.
+
+    Currents of inputs and the simulation are no part of a network, and are left.
+
+    Raises:
+        ConfigError: The file cannot be read, is too large, includes others, or has other components or equations.
+    """
+    try:
+        return _read(parse_xml(read_bytes(Path(path), WHAT), WHAT, MOST_ELEMENTS, MOST_LEVELS))
+    except ConfigError as error:
+        raise ConfigError(f"{path}: {error}") from None
+
+
+def lems_text(
+    network: Network,
+    currents_nA: Mapping[str, float] | None = None,
+    *,
+    timestep_ms: float = 0.1,
+    duration_ms: float = 1000.0,
+    output: str = "potentials.dat",
+) -> str:
+    """Returns a network as LEMS text, of which `read_lems` makes the same network to the last bit.
+
+    It has a simulation that writes all potentials (V) over time (s) into a file.
+
+    Args:
+        network: The network.
+        currents_nA: Constant currents of inputs, nA, by their names; 0 for the others.
+        timestep_ms: Step, ms.
+        duration_ms: Duration, ms.
+        output: Name of the file that a simulator writes.
+
+    Raises:
+        ConfigError: The network has no neurons, a time is not positive, or a name has a character that XML cannot hold.
+    """
+    for check in (require_finite, require_positive):
+        check(timestep_ms=timestep_ms, duration_ms=duration_ms)
+    if not network.neurons:
+        raise ConfigError(f"network {shown(network.name)} has no neurons to export")
+    root = ET.Element("Lems")
+    ET.SubElement(root, "Target", component="simulation")
+    for unit, (dimension, exponents, power) in DIMENSIONS.items():
+        ET.SubElement(root, "Dimension", {"name": dimension, **exponents})
+        ET.SubElement(root, "Unit", symbol=unit, dimension=dimension, power=power)
+    fields = dict(_flat(network_tables(network)))
+    for number, name in enumerate(network.inputs, start=1):
+        fields[f"input_{number}_{INPUT_CURRENT}"] = float((currents_nA or {}).get(name, 0.0))
+    root.append(_type(network, fields))
+    root.extend(ET.fromstring(_SIMULATION))
+    values = {key: _text(value, _unit(key)) for key, value in fields.items()}
+    for key, value in values.items():
+        if not _IN_XML.fullmatch(value):
+            raise ConfigError(
+                f"{key} = {shown(value)} has a character that XML cannot hold, and would be lost: rename it"
+            )
+    ET.SubElement(root, "Component", {"id": "network", "type": TYPE, **values})
+    attributes = {"id": "simulation", "type": "Simulation", "target": "network"}
+    times = {"length": f"{duration_ms!r}ms", "step": f"{timestep_ms!r}ms"}
+    simulation = ET.SubElement(root, "Component", attributes | times)
+    written = ET.SubElement(simulation, "OutputFile", id="potentials", fileName=output)
+    for number in range(1, len(network.neurons) + 1):
+        ET.SubElement(written, "OutputColumn", id=f"neuron_{number}", quantity=f"neuron_{number}_v")
+    ET.indent(root)
+    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
+
+
+def _read(root: ET.Element) -> Network:
+    if root.tag != "Lems":
+        raise ConfigError(f"begins with <{shortened(printable(root.tag))}>: a LEMS file begins with <Lems>")
+    if any(each.tag == "Include" for each in root.iter()):
+        raise ConfigError("includes another file (<Include ..>), and no file that it names is read")
+    components = [each for each in root if each.tag == "Component" and each.get("type") != "Simulation"]
+    if len(components) != 1 or components[0].get("type") != TYPE or len(components[0]):
+        types = {each.get("type", each.tag) for component in components for each in component.iter()}
+        raise ConfigError(
+            f"must have one component beside its simulation, of the type {TYPE} as annelid writes it, but has "
+            f"{shortened(printable(', '.join(sorted(types)))) or 'none'}: equations of other types would be lost"
+        )
+    network = network_of_tables(_tables(components[0]), Network)
+    expected = parse_xml(lems_text(network), WHAT, MOST_ELEMENTS, MOST_LEVELS)
+    for ours, theirs in zip_longest(_definitions(expected), _definitions(root), fillvalue=("",)):
+        if ours != theirs:
+            raise ConfigError(
+                f"<{shortened(printable(theirs[0] or ours[0]))} ..> is not what annelid writes for these neurons and "
+                "connections: other equations and units cannot be read, and would be lost"
+            )
+    return network
+
+
+def _definitions(root: ET.Element) -> Iterator[tuple[Any, ...]]:
+    """All of a file but its components and target, as values that can be compared."""
+
+    def plain(element: ET.Element) -> tuple[Any, ...]:
+        return element.tag, element.attrib, [plain(child) for child in element]
+
+    return (plain(each) for each in root if each.tag not in ("Component", "Target"))
+
+
+def _flat(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Every number, flag and text of nested tables by a name that is made of the keys, lists counted from 1."""
+    for key, value in tree.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{prefix}{key}_")
+        elif isinstance(value, Sequence) and not isinstance(value, str):
+            for number, item in enumerate(value, start=1):
+                if isinstance(item, Mapping):
+                    yield from _flat(item, f"{prefix}{key}_{number}_")
+                else:
+                    yield f"{prefix}{key}_{number}", item
+        elif value is not None:
+            yield prefix + key, value
+
+
+def _tables(component: ET.Element) -> dict[str, Any]:
+    """The tables that `_flat` took apart."""
+    tables: dict[str, Any] = {"name": component.get("name", "network")}
+    for name, text in component.attrib.items():
+        if name in ("id", "type", "name"):
+            continue
+        level, rest = tables, name
+        try:
+            while (found := _KEY.fullmatch(rest)) is not None and found[3] is not None:
+                level, rest = level.setdefault(found[1], {}).setdefault(int(found[2]), {}), found[3]
+            if found is not None:
+                level.setdefault(found[1], {})[int(found[2])] = text
+                continue
+            if rest.startswith("firing_"):
+                level, rest = level.setdefault("firing", {}), rest.removeprefix("firing_")
+            level[rest] = _value(rest, text, name)
+        except (AttributeError, TypeError):
+            raise ConfigError(f"attribute {shown(name)} of the network is none that annelid writes") from None
+    for entry in tables.get("input", {}).values():
+        if isinstance(entry, dict):
+            entry.pop(INPUT_CURRENT, None)
+            entry.setdefault("targets", {})
+    return _listed(tables)
+
+
+def _listed(tree: Any) -> Any:
+    """Makes lists of what is numbered from 1 without gaps."""
+    if not isinstance(tree, dict):
+        return tree
+    if all(isinstance(key, int) for key in tree):
+        if sorted(tree) != list(range(1, len(tree) + 1)):
+            raise ConfigError(
+                f"has parts numbered {', '.join(map(str, sorted(tree)[:9]))}: from 1, none may be missing"
+            )
+        return [_listed(tree[key]) for key in sorted(tree)]
+    return {key: _listed(value) for key, value in tree.items()}
+
+
+def _unit(key: str) -> str:
+    """The unit with which a field's name ends, "" for a plain number."""
+    return next((unit for unit in DIMENSIONS if key.endswith(f"_{unit}")), "")
+
+
+def _text(value: Any, unit: str) -> str:
+    if isinstance(value, str):
+        return value
+    return str(value).lower() if isinstance(value, bool) else f"{float(value)!r}{unit}"
+
+
+def _value(field: str, text: str, place: str) -> Any:
+    if field in _TEXTS:
+        return text
+    if field == "rectified":
+        return _FLAGS.get(text, text)
+    unit = _unit(field)
+    number = text.strip().removesuffix(unit).strip()
+    if len(number) > LONGEST_NUMBER or not _NUMBER.fullmatch(number) or (unit and not text.strip().endswith(unit)):
+        raise ConfigError(
+            f"{shortened(printable(place))} = {shown(text)}: must be a number" + (f" in {unit}" if unit else "")
+        )
+    return float(number)
+
+
+def _type(network: Network, fields: Mapping[str, Any]) -> ET.Element:
+    """The component type: a parameter for every number, and the equations of all neurons."""
+    made = ET.Element("ComponentType", name=TYPE)
+    for key, value in fields.items():
+        if isinstance(value, str | bool):
+            ET.SubElement(made, "Text", name=key)
+        else:
+            ET.SubElement(
+                made, "Parameter", name=key, dimension=DIMENSIONS[unit][0] if (unit := _unit(key)) else "none"
+            )
+    ET.SubElement(made, "Constant", name="one_per_mV", dimension="per_voltage", value="1per_mV")
+    ET.SubElement(made, "Constant", name="one_ms", dimension="time", value="1ms")
+    for number in range(1, len(network.neurons) + 1):
+        ET.SubElement(made, "Exposure", name=f"neuron_{number}_v", dimension="voltage")
+    made.append(_Dynamics(network).element)
+    return made
+
+
+class _Dynamics:
+    """The equations of a network."""
+
+    def __init__(self, network: Network) -> None:
+        self.element = ET.Element("Dynamics")
+        self._states: list[tuple[str, str, str, str]] = []
+        self._events: list[tuple[str, dict[str, str]]] = []
+        place = {name: f"neuron_{number}" for number, name in enumerate(network.neurons, start=1)}
+        tables = network_tables(network)
+        currents: dict[str, list[str]] = {name: [] for name in place.values()}
+        factors: dict[tuple[str, str], list[str]] = {}
+        resets = {place[name]: {f"{place[name]}_v": f"{place[name]}_firing_reset_mV"} for name in place}
+        for number, each in enumerate(tables["connection"], start=1):
+            here, pre, post = f"connection_{number}", place[each["source"]], place[each["target"]]
+            if each["kind"] in ("synapse", "modulatory_synapse"):
+                low = f"{here}_threshold_mV"
+                # LEMS has no minimum and no maximum, and its step H is not in all simulators.
+                self._derived(f"{here}_x", f"({pre}_v - {low}) / ({here}_saturation_mV - {low})")
+                self._derived(f"{here}_above_0", f"({here}_x + abs({here}_x)) / 2")
+                self._derived(f"{here}_open", _at_most_1(f"{here}_above_0"))
+            if each["kind"] == "synapse":
+                currents[post].append(f"{here}_conductance_uS * {here}_open * ({here}_reversal_mV - {post}_v)")
+            elif each["kind"] == "modulatory_synapse":
+                factors.setdefault((each["quantity"], post), []).append(f"({here}_factor ^ {here}_open)")
+            elif each["kind"] == "spiking_synapse":
+                # The time since the last spike is exact in Euler steps too, a decay by its rate would not be.
+                age, peak = f"{here}_age", f"{here}_peak"
+                self._state(peak, "none", "0", "0 / one_ms")
+                self._state(age, "time", "0 * one_ms", "1")
+                release = f"({peak} * exp((0 - {age}) / {here}_time_constant_ms))"
+                resets[pre] |= {peak: _at_most_1(f"({release} + {here}_increment)"), age: "0 * one_ms"}
+                currents[post].append(f"{here}_conductance_uS * {release} * ({here}_reversal_mV - {post}_v)")
+            else:
+                difference = f"({pre}_v - {post}_v)"
+                if each["rectified"]:
+                    difference = f"(({difference} + abs({difference} * one_per_mV) / one_per_mV) / 2)"
+                self._derived(f"{here}_current", f"{here}_conductance_uS * {difference}", "current")
+                currents[post].append(f"{here}_current")
+                currents[pre].append(f"(0 - 1) * {here}_current")
+        for number, each in enumerate(tables["input"], start=1):
+            for target in each["targets"]:
+                currents[place[target]].append(f"input_{number}_{INPUT_CURRENT}")
+        for name, neuron in zip(place.values(), tables["neuron"], strict=True):
+            scaled = dict.fromkeys(get_args(Modulated), "1")
+            for quantity in scaled:
+                if (quantity, name) in factors:
+                    scaled[quantity] = f"{name}_{quantity}_factor"
+                    self._derived(scaled[quantity], " * ".join(factors[quantity, name]))
+            self._neuron(name, neuron, scaled, currents[name])
+            if neuron["firing"] is not None:
+                theta, firing = f"{name}_theta", f"{name}_firing"
+                above = f"{firing}_adaptation * ({name}_v - {name}_rest_mV)"
+                rate = f"({firing}_threshold_mV - {theta} + {above}) / {firing}_adaptation_time_constant_ms"
+                self._state(theta, "voltage", f"{firing}_threshold_mV", rate)
+                self._events.append((f"{name}_v .geq. {theta}", resets[name]))
+        self._finish()
+
+    def _neuron(self, name: str, neuron: Mapping[str, Any], scaled: Mapping[str, str], currents: list[str]) -> None:
+        terms = [f"{name}_leak_conductance_uS * {scaled['leak']} * ({name}_rest_mV - {name}_v)", f"{name}_bias_nA"]
+        for number, channel in enumerate(neuron["channels"], start=1):
+            here = f"{name}_channels_{number}"
+            open_gates = []
+            for gate_number, gate in enumerate(channel["gates"], start=1):
+                at = f"{here}_gates_{gate_number}"
+                closing = f"{at}_factor * exp({at}_slope_per_mV * ({at}_midpoint_mV - {{}}))"
+                self._derived(f"{at}_closing", closing.format(f"{name}_v"))
+                value = f"(1 / (1 + {at}_closing))"
+                if gate["time_constant_ms"] is not None:
+                    tau = f"({at}_time_constant_ms * {scaled['gates']} * {value} * sqrt({at}_closing))"
+                    start = f"1 / (1 + {closing.format(f'{name}_initial_mV')})"
+                    self._state(f"{at}_z", "none", start, f"({value} - {at}_z) / {tau}")
+                    value = f"{at}_z"
+                open_gates.append(f"({value} ^ {at}_power)")
+            self._derived(f"{here}_open", " * ".join([scaled["channels"], *open_gates]))
+            terms.append(f"{here}_conductance_uS * {here}_open * ({here}_reversal_mV - {name}_v)")
+        self._derived(f"{name}_current", " + ".join([*terms, *currents]), "current")
+        self._state(
+            f"{name}_v",
+            "voltage",
+            f"{name}_initial_mV",
+            f"{name}_current / ({name}_capacitance_nF * {scaled['membrane']})",
+        )
+
+    def _state(self, name: str, dimension: str, start: str, rate: str) -> None:
+        self._states.append((name, dimension, start, rate))
+
+    def _derived(self, name: str, value: str, dimension: str = "none") -> None:
+        ET.SubElement(self.element, "DerivedVariable", name=name, dimension=dimension, value=value)
+
+    def _finish(self) -> None:
+        """Writes states before what is derived of them, then rates, starts and events."""
+        start = ET.Element("OnStart")
+        for place, (name, dimension, first, rate) in enumerate(self._states):
+            shown_as = {"exposure": name} if name.endswith("_v") else {}
+            self.element.insert(place, ET.Element("StateVariable", {"name": name, "dimension": dimension, **shown_as}))
+            ET.SubElement(start, "StateAssignment", variable=name, value=first)
+            ET.SubElement(self.element, "TimeDerivative", variable=name, value=rate)
+        self.element.append(start)
+        for test, assignments in self._events:
+            event = ET.SubElement(self.element, "OnCondition", test=test)
+            for variable, value in assignments.items():
+                ET.SubElement(event, "StateAssignment", variable=variable, value=value)
+
+
+def _at_most_1(value: str) -> str:
+    return f"({value} + 1 - abs({value} - 1)) / 2"

@@ -1,0 +1,6 @@
+"""Measured logs: read into series in SI units, aligned with a run, and what they agree in."""
+
+from annelid_lab.logs.agreement import Agreement, compare_with_log
+from annelid_lab.logs.measured import Measured, read_map, read_measured
+
+__all__ = ["Agreement", "Measured", "compare_with_log", "read_map", "read_measured"]

@@ -1,0 +1,1 @@
+"""Robots that an MJCF file describes whole, as a body of annelid."""

@@ -1,0 +1,127 @@
+"""A robot of one's own: a body that an MJCF file describes whole, driven and sensed by the names in it."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from itertools import count
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
+
+from pydantic import AfterValidator, Field, model_validator
+
+from annelid.arena import ROBOT, names_in, read_mjcf, stated_in, validator
+from annelid.config import BodyKind, Line, OwnModel
+from annelid.errors import listed, shown
+
+if TYPE_CHECKING:
+    from annelid.config import RunConfig
+    from annelid.protocols import Plant
+
+EXAMPLE = """<mujoco><compiler autolimits="true"/><worldbody><geom name="floor" type="plane" size="5 5 1"/>
+<body name="head" pos="0 0 0.05"><freejoint/><geom size="0.03" mass="0.2"/>
+<body pos="0.1 0 0"><joint name="s1" type="slide" axis="1 0 0" range="-0.04 0.04"/><geom size="0.03" mass="0.2"/>
+<body pos="0.1 0 0"><joint name="s2" type="slide" axis="1 0 0" range="-0.04 0.04"/><geom size="0.03" mass="0.2"/>
+<body pos="0.1 0 0"><joint name="s3" type="slide" axis="1 0 0" range="-0.04 0.04"/><geom size="0.03" mass="0.2"/>
+</body></body></body></body></worldbody><actuator>
+<position name="ring_1" joint="s1" kp="200" kv="20" ctrlrange="-0.03 0.03"/>
+<position name="ring_2" joint="s2" kp="200" kv="20" ctrlrange="-0.03 0.03"/>
+<position name="ring_3" joint="s3" kp="200" kv="20" ctrlrange="-0.03 0.03"/></actuator><sensor>
+<jointpos name="stretch_1" joint="s1"/><jointpos name="stretch_2" joint="s2"/><jointpos name="stretch_3" joint="s3"/>
+</sensor></mujoco>"""
+"""Four balls on a floor and three motors that draw each to the one before it."""
+PLACE = "{segment}"
+
+
+def _pattern(text: str) -> str:
+    if text.count(PLACE) != 1:
+        raise ValueError(f"{shown(text)}: must have {PLACE} once, where the number of the segment stands")
+    return text
+
+
+Pattern = Annotated[Line, Field(max_length=100), AfterValidator(_pattern)]
+
+
+class MjcfBody(BodyKind):
+    """A robot that an MJCF file describes whole, with its ground.
+
+    Each segment has an actuator, or a left and a right one, and a stretch sensor or several; their names follow
+    patterns. The text refers to no file: what the file has from others, `from_file` has written into it.
+    """
+
+    suffix: ClassVar[str] = ".xml"
+    kind: Literal["mjcf"] = "mjcf"
+    xml: Annotated[str, AfterValidator(validator(ROBOT))] = Field(
+        default=EXAMPLE, description="the robot and its ground as MJCF, at most 1 MB; annelid run robot.xml reads one"
+    )
+    actuators: Annotated[tuple[Pattern, ...], Field(min_length=1, max_length=2)] = Field(
+        default=("ring_{segment}",),
+        description="name of a segment's actuator, or of its left and its right one, with {segment} for its number",
+    )
+    sensors: Annotated[tuple[Pattern, ...], Field(min_length=1, max_length=200)] = Field(
+        default=("stretch_{segment}",),
+        description="names of a segment's stretch sensors: tendons, or sensors of a tendon's or a joint's length",
+    )
+    first_segment: Annotated[int, Field(ge=0, le=1)] = Field(
+        default=1, description="number of the foremost segment in the names"
+    )
+
+    @classmethod
+    def from_file(cls, path: Path) -> dict[str, Any]:
+        """Reads an MJCF file and the meshes that it names beside it, and the physics step that it states.
+
+        Raises:
+            ConfigError: The file cannot be read, or has what a robot cannot have.
+        """
+        xml = read_mjcf(path, ROBOT)
+        step_s = stated_in(xml, ROBOT, "option", "timestep")
+        clock = {} if step_s is None else {"clock": {"physics_timestep_s": float(step_s)}}
+        return {"body": {"kind": "mjcf", "xml": xml}, **clock}
+
+    @property
+    def n_segments(self) -> int:
+        """Segments that have all their actuators, counted from the first one on."""
+        there = set(names_in(self.xml, ROBOT, "actuator"))
+        return next(n for n in count() if not there.issuperset(self._named(self.actuators, n)))
+
+    @property
+    def has_halves(self) -> bool:
+        """Whether each segment has a left and a right actuator."""
+        return len(self.actuators) == 2
+
+    @property
+    def own_model(self) -> OwnModel:
+        """The file, and the names of the actuators of all segments."""
+        names = (name for n in range(self.n_segments) for name in self._named(self.actuators, n))
+        return OwnModel(self.xml, tuple(names))
+
+    @property
+    def sensor_names(self) -> list[list[str]]:
+        """Names of the stretch sensors of each segment."""
+        return [self._named(self.sensors, n) for n in range(self.n_segments)]
+
+    @model_validator(mode="after")
+    def _has_segments(self) -> Self:
+        if not self.n_segments:
+            wanted = listed(self._named(self.actuators, 0))
+            there = listed(names_in(self.xml, ROBOT, "actuator")) or "none"
+            raise ValueError(f"body.actuators: the file has no actuator named {wanted}; it has {there}")
+        known = {*names_in(self.xml, ROBOT, "tendon"), *names_in(self.xml, ROBOT, "sensor")}
+        for name in (name for names in self.sensor_names for name in names):
+            if name not in known:
+                raise ValueError(
+                    f"body.sensors: the file has no tendon and no sensor named {name!r}; it has "
+                    f"{listed(sorted(known)) or 'none'}"
+                )
+        return self
+
+    def check_with(self, config: RunConfig) -> None:
+        """Checks that no arena is given."""
+        if config.arena is not None:
+            raise ValueError("arena has no effect on body.kind = 'mjcf', whose file has its own ground")
+
+    def build(self, config: RunConfig) -> Plant:
+        """Builds the robot, as `BodyKind.build`."""
+        return import_module("annelid_lab.robots.plant").MjcfPlant(self, config)
+
+    def _named(self, patterns: tuple[str, ...], n: int) -> list[str]:
+        return [pattern.replace(PLACE, str(self.first_segment + n)) for pattern in patterns]

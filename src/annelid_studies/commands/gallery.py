@@ -1,0 +1,268 @@
+"""The command `gallery`: makes the pictures of the documentation from the list in ``annelid_studies/gallery.toml``."""
+
+from __future__ import annotations
+
+import csv
+import shlex
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from functools import cache, partial
+from importlib.resources import files
+from math import nan
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+
+import typer
+
+from annelid.cli import Jobs, Quiet, app, config_of, give, kept_runs, overrides_of, print_paths, study
+from annelid.errors import ConfigError, RunKilled, suggest
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from annelid.experiment import Case, Store
+
+QUICK_MINUTES = 3.0
+"""Pictures that take longer are made only if they are named, or with --all."""
+TILE_PX, TILE_COLUMNS = (560, 350), 4
+PAGE_VIDEO_PX = (640, 400)
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """An entry of the list, which explains the fields."""
+
+    command: str
+    maker: str
+    minutes: float
+    pages: Sequence[str]
+    results: str = ""
+    time_s: float = 0.0
+    camera: str | None = None
+    cameras: Mapping[str, str] = field(default_factory=dict)
+    study: Mapping[str, Any] = field(default_factory=dict)
+
+
+class Job(NamedTuple):
+    """A picture to make, with where things are."""
+
+    picture: Picture
+    stem: Path  # Where to draw, without a suffix
+    results: Path  # The file that it is redrawn from
+    store: Store
+
+
+@cache
+def pictures() -> dict[str, Picture]:
+    """Reads the list: every picture by the name of its file."""
+    from annelid.textfiles import parse_toml
+
+    name = "gallery.toml"
+    listed = parse_toml((files("annelid_studies") / name).read_text(encoding="utf-8"), name)
+    return {picture: Picture(**entry) for picture, entry in listed.items()}
+
+
+@study("gallery")
+def gallery_command(
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[NAME]...", help="Pictures, such as slip.png.  [default: all that take minutes]"),
+    ] = None,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the pictures.")] = Path("docs/images"),
+    results: Annotated[Path, typer.Option(help="Folder of the result files.")] = Path("docs/results"),
+    kept: Annotated[Path, typer.Option(help="Folder in which runs are kept.")] = Path("build/gallery"),
+    every: Annotated[bool, typer.Option("--all", help="Also the pictures that take long, up to hours.")] = False,
+    as_list: Annotated[bool, typer.Option("--list", help="Only list the pictures.")] = False,
+    jobs: Jobs = None,
+    quiet: Quiet = False,
+) -> None:
+    """Make the pictures of the documentation again.
+
+    A list names the command of each picture, what it takes, and the pages that show it. Pictures of numbers in
+    docs/results are redrawn from there; others are drawn from runs, which are kept, so that a second call takes
+    seconds. Without names it makes the pictures that take a few minutes or less. Call it in the repository.
+
+    \b
+    annelid study gallery --list
+    annelid study gallery slip.png arenas.png
+    annelid study gallery -o drafts
+    """
+    if as_list:
+        from annelid.terminal import Console
+
+        if not give({name: asdict(one) for name, one in pictures().items()}):
+            Console().print(_listing())
+        return
+    made_by, known = makers(), pictures()
+    for name in names or []:
+        if name not in known:
+            raise ConfigError(f"there is no picture {name!r}: {suggest(name, known)}")
+        if known[name].maker == "by-hand":
+            raise ConfigError(f"{name} is not remade by this command, but with: {known[name].command}")
+    chosen = names or [
+        name for name, one in known.items() if one.maker != "by-hand" and (every or one.minutes <= QUICK_MINUTES)
+    ]
+    output.mkdir(parents=True, exist_ok=True)
+    with kept_runs(kept, jobs=jobs, quiet=quiet) as store:
+        store.compute([case for name in chosen for case in cases(known[name]).values()], "gallery")
+        for name in chosen:
+            one = known[name]
+            drawn = made_by[one.maker](Job(one, kept / Path(name).stem, results / one.results, store))
+            print_paths([shutil.copyfile(drawn, output / name)])
+
+
+def _listing() -> Table:
+    from rich.table import Table
+
+    table = Table("picture", "minutes", "made from", "command", box=None)
+    table.columns[0].no_wrap = True
+    for name, one in pictures().items():
+        source = one.results or {"by-hand": "by hand", "command": "the command"}.get(one.maker, "runs")
+        table.add_row(name, f"{one.minutes:g}", source, one.command)
+    return table
+
+
+def cases(picture: Picture) -> Mapping[str, Case]:
+    """Returns the runs that a picture is drawn from: one, or that in every arena by the arena's name."""
+    if picture.maker not in ("frame", "figure7", "track", "video", "arenas"):
+        return {}
+    from typer.main import get_command
+
+    from annelid.config import arena_names
+    from annelid.experiment import Case
+
+    program: Any = get_command(app)
+    above = program.make_context("annelid", [], resilient_parsing=True)
+    given = program.commands["run"].make_context("run", shlex.split(picture.command)[2:], parent=above).params
+    preset, segments, fidelity = given["preset"], given["segments"], given["fidelity"]
+    changes = overrides_of(given["assignments"], duration_s=given["duration"], seed=given["seed"])
+    arenas = arena_names() if picture.maker == "arenas" else [given["arena"]]
+    return {one: Case(preset, base=config_of(preset, dict(changes), segments, fidelity, one)) for one in arenas}
+
+
+def _of_run(job: Job) -> Path:
+    from annelid.draw import RUN_FIGURES, render_frame, render_video
+
+    one, path = job.picture, job.stem.with_suffix(".png")
+    (case,) = cases(one).values()
+    run = job.store.run(case)
+    if one.maker == "frame":
+        return render_frame(run, one.time_s, path, camera=one.camera)
+    if one.maker == "video":
+        return render_video(run, path.with_suffix(".mp4"), fps=15.0, size=PAGE_VIDEO_PX)
+    return RUN_FIGURES.find(one.maker)(run, path)
+
+
+def _arenas(job: Job) -> Path:
+    from annelid.analysis import nearest_time
+    from annelid.draw import DEFAULT_CAMERA, WIDTH_IN, WormScene, canvas, legend_handle, save
+
+    found, time_s, handles = cases(job.picture), job.picture.time_s, []
+    width, height = TILE_PX
+    rows = -(-(len(found) + 1) // TILE_COLUMNS)
+    with canvas(rows * (WIDTH_IN / TILE_COLUMNS * height / width + 0.2)) as figure:
+        panels = figure.subplots(rows, TILE_COLUMNS, squeeze=False).ravel()
+        for axes in panels:
+            axes.axis("off")
+        for axes, (name, case) in zip(panels, found.items(), strict=False):
+            run, camera = job.store.run(case), job.picture.cameras.get(name, DEFAULT_CAMERA)
+            with WormScene(run, width, height, camera, fine=True, words=False) as scene:
+                axes.imshow(scene.picture(nearest_time(run, scene.times_s, time_s)))
+                handles = [legend_handle(*entry) for entry in scene.legend]
+            axes.set_title(name, fontsize=8.0, pad=2.0)
+        look: dict[str, Any] = {"loc": "center left", "alignment": "left", "fontsize": 8.0}
+        panels[len(found)].legend(handles=handles, title=f"{time_s:g} s after the start", **look)
+        return save(figure, job.stem.with_suffix(".png"))
+
+
+def _sweep(job: Job) -> Path:
+    from annelid import sweep
+
+    sweep(job.picture.study, job.stem, progress=job.store.progress)
+    return job.stem / "sweep.png"
+
+
+def _command(job: Job) -> Path:
+    words = [*shlex.split(job.picture.command)[1:], "--quiet", "-o", str(job.stem)]
+    done = subprocess.run([sys.executable, "-m", "annelid", *words], stdout=subprocess.DEVNULL, check=False)
+    if done.returncode:
+        raise RunKilled(f"{job.picture.command}: ended with exit code {done.returncode}")
+    return job.stem / f"{job.stem.name}.png"
+
+
+def _rows(job: Job) -> list[dict[str, str]]:
+    from annelid.textfiles import read_text
+
+    return list(csv.DictReader(read_text(job.results).splitlines()))
+
+
+def _fields(draw: Callable[[Any, Path], Path], kind: Any, job: Job) -> Path:
+    """Draws rows of which every column is a field; an empty cell is NaN where it is no text."""
+    from pydantic import TypeAdapter
+
+    empty = {name: "" if of == "str" else nan for name, of in kind.__annotations__.items()}
+    rows = [{name: cell or empty[name] for name, cell in row.items()} for row in _rows(job)]
+    return draw([TypeAdapter(kind).validate_python(row) for row in rows], job.stem)
+
+
+def _slip(job: Job) -> Path:
+    from annelid_studies import slip
+
+    readings = []
+    for friction, controller, in_order, draws, *numbers in (row.values() for row in _rows(job)):
+        estimates: Any = zip(*[map(float, numbers)] * 3, strict=True)
+        readings.append(slip.Reading(float(friction), controller, int(in_order), int(draws), *estimates))
+    return slip.feedback_figure(readings, job.stem)
+
+
+def _bench(job: Job) -> Path:
+    from annelid.textfiles import read_json
+    from annelid_studies.bench.report import bench_figure
+
+    return bench_figure(read_json(job.results), job.stem)
+
+
+def _tuning(job: Job) -> Path:
+    from annelid.draw import Mark, progress_figure
+    from annelid.experiment import START
+
+    numbers = [START if row["trial"] == "start" else int(row["trial"]) for row in _rows(job)]
+    rows = zip(numbers, _rows(job), strict=True)
+    marks = [Mark(number, (float(row["speed_m_per_s"] or nan),), not row["problem"]) for number, row in rows]
+    return progress_figure(marks, "speed (m/s)", True, job.stem)
+
+
+def _uncertainty(job: Job) -> Path:
+    from annelid.draw import Panel, uncertainty_figure
+
+    def panel(title: str, start: str, scale: float) -> Panel:
+        own = [row for row in _rows(job) if row["quantity"].startswith(start)]
+        numbers = {kind: [scale * float(row[kind] or nan) for row in own] for kind in ("value", *kinds)}
+        ticks = [row["quantity"].partition(".")[2] for row in own]
+        return Panel(title, ticks, numbers["value"], {name: numbers[kind] for kind, name in kinds.items()})
+
+    kinds = {"parameters": "parameters", "time_step": "time step", "elements": "elements"}
+    elongation = panel("elongation of each segment, mean of its sensors (cm)", "elongation_mean_max_m.", 100.0)
+    return uncertainty_figure([elongation, panel("period (s)", "period_s", 1.0)], job.stem.with_suffix(".png"))
+
+
+def makers() -> Mapping[str, Callable[[Job], Path]]:
+    """All that an entry of the list can ask for."""
+    from annelid_studies import riddle2025
+    from annelid_studies.challenge import ranking, report
+
+    return {
+        **dict.fromkeys(("frame", "figure7", "track", "video"), _of_run),
+        "arenas": _arenas,
+        "sweep": _sweep,
+        "command": _command,
+        "slip": _slip,
+        "challenge": partial(_fields, report.ranking_figure, ranking.Standing),
+        "riddle2025": partial(_fields, riddle2025.comparison_picture, riddle2025.Reading),
+        "bench": _bench,
+        "tuning": _tuning,
+        "uncertainty": _uncertainty,
+    }

@@ -1,0 +1,277 @@
+"""The studies that have commands of many options: `paper`, `bench`, `robustness` and `challenge`."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from annelid.cli import (
+    EXIT_SOME_FAILED,
+    Jobs,
+    OnlyPaths,
+    Output,
+    Quiet,
+    ResultsFolder,
+    SchedulerAddress,
+    command,
+    complain,
+    end_study,
+    going_on,
+    kept_runs,
+    lock,
+    print_results,
+    study,
+    wants_json,
+)
+from annelid.errors import RunFileError
+
+
+@command("paper", "")
+@study("paper")
+def paper_command(
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the report.")] = Path("report"),
+    quick: Annotated[bool, typer.Option("--quick", help="Coarser maps, the same claims: about 6 minutes.")] = False,
+    only: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME", help="Only this examination, and the main numbers; may be repeated."),
+    ] = None,
+    jobs: Jobs = None,
+    scheduler: SchedulerAddress = None,
+    claims: Annotated[
+        Path | None, typer.Option(metavar="FILE.md", help="Write the table of claims there as well, as Markdown.")
+    ] = None,
+    quiet: OnlyPaths = False,
+) -> None:
+    """Reproduce the paper's figures and claims, and examine them.
+
+    Writes report.html, one file with all pictures to read and to send, and report.md beside its figures.
+    The whole takes about an hour on two cores, --quick about 6 min. Every run is kept in report/runs, so
+    a second call takes seconds, and a killed one goes on where it was.
+
+    \b
+    annelid study paper                                      the whole, into the folder report
+    annelid study paper --quick -o draft                     the same claims from coarser maps
+    annelid study paper --only pins --only friction          these examinations only
+    annelid study paper -o report --claims docs/paper.md     and the table of claims for the repository
+    """
+    from annelid.output import with_suffix, write_text
+    from annelid_studies.riddle2023.paper import reproduce
+    from annelid_studies.riddle2023.report import claims_page, write_report
+
+    if claims is not None:
+        if only:
+            raise typer.BadParameter("--claims needs the whole report, so leave --only out")
+        claims = with_suffix(claims, (".md",), "Markdown", default=".md")
+        if not claims.parent.is_dir():
+            raise RunFileError(f"{claims} cannot be written: there is no folder {claims.parent}")
+    with kept_runs(output, jobs=jobs, scheduler=scheduler, quiet=quiet) as store:
+        effort = "quick" if quick else "full"
+        report = reproduce(output, effort, only=only or None, executor=store.executor, progress=store.progress)
+        html = write_report(report, output)
+    written = [html, html.with_suffix(".md")]
+    if claims is not None:
+        written.append(write_text(claims, claims_page(report)))
+    numbers = [dict(zip(report.main_table.header, row, strict=True)) for row in report.main_table.rows]
+    examined = {each.examination.name: dict(each.findings.numbers) for each in report.examinations}
+    found = {"numbers": numbers, "claims": [asdict(claim) for claim in report.claims], "examinations": examined}
+    print_results(written, quiet=quiet, results=found)
+
+
+@study("bench")
+def bench_command(
+    output: ResultsFolder = Path("bench"),
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer points: up to a quarter of an hour.")] = False,
+    cases: Annotated[
+        list[str] | None, typer.Option(metavar="LINE", help="Only these cases; may be repeated.  [default: all]")
+    ] = None,
+    against: Annotated[
+        Path | None, typer.Option(metavar="bench.json", help="Fail if a case is over 10 % slower than it was there.")
+    ] = None,
+    quiet: Quiet = False,
+) -> None:
+    """Measure speed and error side by side.
+
+    Times closed loops with their recording, each in a process of its own on one core, and compares their
+    elongation, period, travel, work and slip with a converged run, three times with slightly different friction.
+    Writes bench.json, bench.png and bench.svg: error against speed, processor time beside the paper's formulation,
+    cost against the number of segments, and where the time of a step goes.
+
+    \b
+    --cases levels      the levels of --fidelity, riddle2025-muscles and riddle2023-fast, beside riddle2023
+    --cases steps       physics steps of 1 to 40 ms
+    --cases segments    rods of 3 to 30 segments
+    --cases chain       the paper's formulation, 3 to 12 segments
+    --cases duration    10 and 60 s, for the memory
+
+    The whole takes up to half an hour. Leave the machine alone meanwhile: what else runs is measured too.
+    Every measurement is kept in bench/cases, so a second call goes on where the first one was stopped, and
+    a full run takes over what --quick measured. Delete that folder to measure again.
+
+    --against compares with an earlier bench.json of the same machine. A machine is not as fast at all times: steps are
+    therefore counted in those of a small model of the engine alone, timed before and after each case.
+
+    \b
+    annelid study bench                                   everything, into the folder bench
+    annelid study bench --quick                           an overview
+    annelid study bench --cases levels -o levels          levels of fidelity and presets only
+    annelid study bench --cases segments --cases chain    how the cost grows with the worm
+    annelid study bench --quick -o now --against before/bench.json    has it become slower?
+    """
+    from annelid.experiment import study_progress
+    from annelid.textfiles import read_json
+    from annelid_studies.bench.benchmark import SLOWDOWN, bench, in_yardsticks, slowdowns
+    from annelid_studies.bench.report import bench_figure, bench_table, slowdown_table
+
+    before = None if against is None else in_yardsticks(read_json(against))
+
+    lock(output)
+    with going_on(output / "cases", kept="what was measured is kept"), study_progress(quiet=quiet) as progress:
+        path = bench(output, "quick" if quick else "full", lines=cases or None, progress=progress)
+    report = json.loads(path.read_text(encoding="utf-8"))
+    tables = [] if quiet else [bench_table(report)]
+    slower = {} if before is None else slowdowns(in_yardsticks(report), before)
+    if slower and not quiet:
+        tables.append(slowdown_table(slower, SLOWDOWN))
+    print_results((path, bench_figure(report, output / "bench")), *tables, quiet=quiet)
+    end_study(len(report["cases"]), sum("failed" in case for case in report["cases"]), path)
+    if worst := [name for name, share in slower.items() if share > SLOWDOWN]:
+        load = max(case.get("load_average_1min") or 0.0 for case in report["cases"])
+        doubt = "; other programs ran meanwhile, so measure again alone" if load > 1.0 else ""
+        complain(f"slower than in {against} by over {100 * SLOWDOWN:.0f} %: {', '.join(worst)}{doubt}")
+        raise typer.Exit(EXIT_SOME_FAILED)
+
+
+@study("robustness")
+def robustness_command(
+    output: ResultsFolder = Path("robustness"),
+    points: Annotated[int, typer.Option(min=1, max=1_000_000, help="How many points of the sample.")] = 300,
+    segments: Annotated[
+        int | None,
+        typer.Option(min=3, max=200, help="Give every worm this many segments.  [default: as drawn, 3 to 24]"),
+    ] = None,
+    controller: Annotated[
+        list[str] | None, typer.Option(metavar="KIND", help="Only this one; may be repeated.  [default: all four]")
+    ] = None,
+    keep: Annotated[
+        bool, typer.Option("--keep", help="Keep what robustness.json says of points run by other versions of the code.")
+    ] = False,
+    jobs: Jobs = None,
+    scheduler: SchedulerAddress = None,
+    quiet: OnlyPaths = False,
+) -> None:
+    """Compare how often controllers make different worms walk.
+
+    The designed sample varies sensor noise, friction, physics step, number of segments and stiffness. Every worm is
+    driven by four controllers: sns (the paper's, with the preset's tolerance), sns-tolerance (the paper's, with the
+    tolerance that its body needs), sns-robust, and timed (a wave without sensing). Writes robustness.json and
+    robustness.md after every run, and keeps runs, so that a second call goes on where the first was stopped. All 300
+    points take about 25 hours of one core for each controller.
+
+    \b
+    annelid study robustness --points 10 -o draft     the first ten points
+    annelid study robustness --segments 3             short worms only
+    annelid study robustness --controller sns-robust  only ours
+    annelid study robustness --points 300             all
+    """
+    from annelid_studies.robustness import CONTROLLERS, robustness, shares, shares_table
+
+    with kept_runs(output, jobs=jobs, scheduler=scheduler, quiet=quiet) as store:
+        judged = robustness(
+            output,
+            points,
+            controllers=tuple(controller or CONTROLLERS),
+            n_segments=segments,
+            keep=keep,
+            executor=store.executor,
+            progress=store.progress,
+        )
+    if not (quiet or wants_json()):
+        typer.echo(shares_table(shares(judged)))
+    print_results((output / "robustness.json", output / "robustness.md"), quiet=quiet)
+
+
+@study("challenge")
+def challenge_command(
+    entrants: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[ENTRANT]...",
+            help="Names of entrants, files of entrants (.toml), or module:name of a controller of your own."
+            "  [default: all that annelid has]",
+        ),
+    ] = None,
+    task: Annotated[
+        list[str] | None, typer.Option(metavar="NAME", help="Only this task; may be repeated.  [default: all]")
+    ] = None,
+    draws: Annotated[int, typer.Option(min=1, max=1000, help="Draws of every task.")] = 8,
+    first_seed: Annotated[
+        int, typer.Option(min=0, max=2**32 - 1, help="Seed of the first draw; those below 1000 are for training.")
+    ] = 1000,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Three tasks, three entrants, two draws, short runs: under five minutes.")
+    ] = False,
+    finer: Annotated[
+        int, typer.Option(min=1, max=10, metavar="N", help="Bodies move in steps N times as short: 2, or 5 of 10 ms.")
+    ] = 1,
+    against: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="RUNS.csv", help="Compare rankings with another call's, by Kendall's tau; may be repeated."
+        ),
+    ] = None,
+    known: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--with", metavar="RUNS.csv", help="Take the runs that another call has computed; may be repeated."
+        ),
+    ] = None,
+    output: Output = Path("challenge"),
+    jobs: Jobs = None,
+    scheduler: SchedulerAddress = None,
+    quiet: Quiet = False,
+) -> None:
+    """Rank controllers in a benchmark of crawling.
+
+    Every entrant runs every task with the same draws, in the same body and blind to the draws. The tuned timed wave
+    always runs too, as the reference. Writes runs.csv, one row per run; scores.csv, means with 95 % intervals by
+    entrant and task; tasks.csv, one row per task; challenge.png and .svg. Runs are kept: a second call takes seconds,
+    and the same command continues an interrupted one. The whole takes a few hours on two cores; docs/challenge.md has
+    tasks, rules and results.
+
+    \b
+    annelid study challenge --quick                                   in minutes
+    annelid study challenge                                           all entrants, all tasks
+    annelid study challenge mine:Controller --task slope --draws 4    your own, against the reference
+    annelid study challenge mine.toml --with published/runs.csv       only yours is computed
+    annelid study challenge --finer 2 -o half
+    annelid study challenge --against half/runs.csv                   is the ranking the same?
+    """
+    from annelid_studies.challenge import report, tasks
+    from annelid_studies.challenge.ranking import Standing, agreement, mean_speeds, standings
+    from annelid_studies.challenge.scores import Score, challenge, read_scores
+
+    if quick:
+        entrants, task = entrants or [*tasks.QUICK_ENTRANTS], task or [*tasks.QUICK_TASKS]
+        draws = min(draws, tasks.QUICK_DRAWS)
+    seeds = range(first_seed, first_seed + draws)
+    others = [mean_speeds(read_scores(path)) for path in against or []]
+    earlier = [one for path in known or [] for one in read_scores(path)]
+    duration_s = tasks.QUICK_DURATION_S if quick else None
+    found = tasks.find_entrants(entrants or [])
+    wanted = tasks.entries(found, task or [], seeds, finer=finer, duration_s=duration_s)
+    with kept_runs(output, jobs=jobs, scheduler=scheduler, quiet=quiet) as store:
+        scores = challenge(store, wanted, earlier)
+    ranked = standings(scores)
+    taus = [agreement(mean_speeds(scores), other) for other in others]
+    written = [
+        report.write_rows(Score, scores, output / "runs.csv"),
+        report.write_rows(Standing, ranked, output / "scores.csv"),
+        report.write_tasks(ranked, taus, output / "tasks.csv"),
+        report.ranking_figure(ranked, output / "challenge"),
+    ]
+    tables = report.ranking_table(ranked), report.cost_table(ranked), report.speed_table(ranked, taus)
+    print_results(written, *tables, quiet=quiet)

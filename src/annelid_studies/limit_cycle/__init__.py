@@ -1,0 +1,1 @@
+"""Limit cycles of planar worms: their period, Floquet multipliers and phase response."""

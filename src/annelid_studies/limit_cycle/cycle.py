@@ -1,0 +1,482 @@
+"""Limit cycles of a worm under its nervous system: found by shooting, linearised, and kicked.
+
+The return map of a section is iterated, or solved by Newton's method, until the orbit closes; state-transition
+matrices along it give the Floquet multipliers and the phase response (Seydel 2010, ch. 7; Ermentrout & Terman 2010,
+ch. 8). Steps of finite length are not a flow: their trivial multiplier is not 1, and kinks within a step take it
+further away; `Continuous` and `Piecewise` of `annelid_studies.limit_cycle.flow` take care of both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import reduce
+from itertools import accumulate
+from typing import Literal, cast, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from annelid.clock import StepRatio
+from annelid.config import RunConfig, load_config
+from annelid.control import paper_controller
+from annelid.errors import AnnelidError, ConfigError, suggest
+from annelid.protocols import Array, Controller, Plant, Stateful
+from annelid.simulation import build_controller, build_plant
+from annelid_studies.limit_cycle.flow import (
+    ClosedLoop,
+    Continuous,
+    Copies,
+    Flow,
+    Switches,
+    advance,
+    first_share,
+    travel,
+)
+
+Time = Literal["continuous", "located", "stepped"]  # how a worm's time is taken; see `limit_cycle`
+
+# Step whose change is the vector field, and the step that the field is integrated with, s.
+_FIELD_STEP_S = 1e-5
+_CONTINUOUS_STEP_S = 1e-3
+_MOST_RETURNS, _MOST_NEWTON = 40, 12
+# A closing error that shrinks by less than this factor a return calls for Newton's method.
+_SLOW = 0.5
+# Copies that run at once, for the processor's cache.
+_MOST_COPIES = 2048
+
+
+class NoLimitCycle(AnnelidError):
+    """No periodic orbit was found: the section was not met, or the orbit did not close."""
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """The event that ends a cycle: a state rising through a threshold."""
+
+    state: int  # its index
+    threshold: float  # in its unit
+
+
+@dataclass(frozen=True, slots=True)
+class LimitCycle:
+    """A periodic orbit, its linearisation and its phase response; arrays hold ``n_phases + 1`` instants of one cycle.
+
+    Attributes:
+        labels: Names of the states.
+        period_s: Period, s.
+        timestep_s: Step that it was computed with, s.
+        section: Where the cycle begins and ends.
+        closing_error: Largest distance between beginning and end in any state, as a share of its range.
+        n_returns: Returns to the section (or Newton steps) that it took to close the orbit.
+        time_s: Instants, s, from 0 to the period, ``(n_phases + 1,)``.
+        state: Shape ``(n_phases + 1, n_states)``.
+        switches: Switches in force there, ``(n_phases + 1, n_switches)``.
+        switch_time_s: When a switch moves, s, ``(n_moves,)``.
+        range: Peak to peak of every state over the cycle (1 for one that does not move), ``(n_states,)``.
+        transitions: State-transition matrices from each instant to the next, ``(n_phases, n_states, n_states)``.
+        monodromy: Their product, the state-transition matrix of a period, ``(n_states, n_states)``.
+        multipliers: Floquet multipliers, its eigenvalues, by falling magnitude, ``(n_states,)``, complex.
+        eigenvectors: Its right eigenvectors at the section in the same order, one a column, of norm 1 when every
+            state is measured by its range, ``(n_states, n_states)``, complex.
+        trivial: Index of the multiplier nearest to 1, whose eigenvector is along the orbit.
+        phase_response: Infinitesimal phase response curves, ``(n_phases + 1, n_states)``: by how many seconds a
+            cycle is advanced by a unit of perturbation of each state there; on a kink, the mean of both sides.
+    """
+
+    labels: tuple[str, ...]
+    period_s: float
+    timestep_s: float
+    section: Section
+    closing_error: float
+    n_returns: int
+    time_s: Array
+    state: Array
+    switches: Switches = field(repr=False)
+    switch_time_s: Array = field(repr=False)
+    range: Array = field(repr=False)
+    transitions: Array = field(repr=False)
+    monodromy: Array = field(repr=False)
+    multipliers: NDArray[np.complex128]
+    eigenvectors: NDArray[np.complex128] = field(repr=False)
+    trivial: int
+    phase_response: Array = field(repr=False)
+
+
+def limit_cycle(
+    config: RunConfig,
+    *,
+    time: Time = "continuous",
+    neuron: str = "contraction_1",
+    threshold_mV: float | None = None,
+    settle_s: float = 5.0,
+    n_phases: int = 100,
+) -> LimitCycle:
+    """Finds the limit cycle of a configured worm under its nervous system.
+
+    Args:
+        config: A configuration with a planar body and the synthetic nervous system, without sensor noise.
+        time: ``"stepped"``: the worm as it runs, its sensors switching at whole steps only; ``"located"``: the same
+            steps, but shortened where a sensor switches; ``"continuous"``: the differential equation that the steps
+            approximate, integrated by a method of third order that also locates the kinks of the synapses. The
+            linearisation is faithful in the last only.
+        neuron: The cycle begins when this neuron's potential rises through the threshold.
+        threshold_mV: Relative to rest; default: half of the operating range R.
+        settle_s: Simulated time before the search begins, s, longer than ``sensor.startup_hold_s``.
+        n_phases: Arcs that the orbit is cut into.
+
+    Raises:
+        ConfigError: A controller without neurons, no such neuron, sensor noise, a loop that depends on time itself
+            or has too many states (`ClosedLoop`).
+        NoLimitCycle: The worm does not oscillate, or not periodically.
+    """
+    network = paper_controller(config.controller)
+    if network is None:
+        raise ConfigError(f"controller.kind = {config.controller.kind!r} has no neurons whose rise could begin a cycle")
+    flow, state, switches = flow_of(config, time, settle_s)
+    section = section_at(flow, neuron, 0.5 * network.range_mV if threshold_mV is None else threshold_mV)
+    # The field's rounding, divided by its short step, leaves no more digits.
+    tolerance = 1e-7 if time == "continuous" else 1e-9
+    return find_limit_cycle(
+        flow, state, switches, section, n_phases=n_phases, tolerance=tolerance, refine=time != "stepped"
+    )
+
+
+def flow_of(config: RunConfig, time: Time = "continuous", settle_s: float = 5.0) -> tuple[Flow, Array, Switches]:
+    """Builds the closed loop of a configuration and lets it run until its start is over.
+
+    Arguments and errors are those of `limit_cycle`; a continuous flow needs a planar body and a controller that is the
+    same at every time step.
+
+    Returns:
+        The flow, its states ``(1, n_states)`` and its switches ``(1, n_switches)``.
+    """
+    if time not in get_args(Time):
+        raise ConfigError(f"unknown time {time!r}: {suggest(time, get_args(Time))}")
+    if config.sensor.noise_m > 0.0:
+        raise ConfigError(f"sensor.noise_m = {config.sensor.noise_m:g} m leaves no limit cycle: set sensor.noise_m=0")
+    if not settle_s > config.sensor.startup_hold_s:
+        raise ConfigError(
+            f"settle_s = {settle_s:g} must be longer than sensor.startup_hold_s = {config.sensor.startup_hold_s:g}"
+        )
+    clock = config.clock
+    stride = StepRatio(clock.control_timestep_s, clock.physics_timestep_s).control_steps_per_move
+    plant = build_plant(config)
+    controller = build_controller(config, plant)
+    flow, state, switches = settled(plant, controller, clock.control_timestep_s, settle_s, stride=stride)
+    if time != "continuous":
+        return flow, state, switches
+    # The same loop in forward Euler steps so short that they are the vector field.
+    tree = config.model_dump()
+    tree["clock"] = {"control_timestep_s": _FIELD_STEP_S, "physics_timestep_s": _FIELD_STEP_S}
+    if paper_controller(config.controller) is not None:
+        tree["controller"]["scheme"] = "euler"
+    # Time runs slower there, and must not come back into the hold.
+    tree["sensor"]["startup_hold_s"] = 0.0
+    tree["record"] = {"signals_interval_s": config.duration_s, "frames_interval_s": config.duration_s}
+    short = load_config(tree)
+    body = build_plant(short)
+    nerves = build_controller(short, body)
+    for new, old in ((body, plant), (nerves, controller)):
+        cast(Stateful, new).set_state(cast(Stateful, old).get_state())
+    loop = ClosedLoop(body, nerves, _FIELD_STEP_S, kinks=True)
+    return Continuous(loop, _CONTINUOUS_STEP_S), *loop.present()
+
+
+def settled(
+    plant: Plant, controller: Controller, control_timestep_s: float, settle_s: float, *, stride: int = 1
+) -> tuple[ClosedLoop, Array, Switches]:
+    """Lets any plant and controller run from their reset for ``settle_s``, and makes the closed loop of them.
+
+    The body moves every ``stride`` control steps.
+
+    Returns:
+        The loop, its states ``(1, n_states)`` and its switches ``(1, n_switches)``.
+
+    Raises:
+        ConfigError: The loop depends on time itself, or cannot be linearised (`ClosedLoop`).
+    """
+    sensation = plant.reset(0)
+    controller.reset(0)
+    earlier = ClosedLoop(plant, controller, control_timestep_s, stride)
+    n_steps = stride * max(2, round(settle_s / control_timestep_s / stride))
+    middle = n_steps // stride // 2 * stride
+    for step in range(n_steps):
+        if step == middle:
+            earlier = ClosedLoop(plant, controller, control_timestep_s, stride)
+        sensation = plant.step(controller.step(sensation))
+    loop = ClosedLoop(plant, controller, control_timestep_s, stride)
+    state, switches = loop.present()
+    if not all(map(np.array_equal, loop.step(state, switches), earlier.step(state, switches))):
+        raise ConfigError(
+            f"{type(plant).__name__} under {type(controller).__name__} depends on time itself, not on its state alone: "
+            "only an autonomous loop has a limit cycle of its own"
+        )
+    return loop, state, switches
+
+
+def section_at(flow: Flow, label: str, threshold: float) -> Section:
+    """Returns where the state of that label rises through a threshold, in its unit.
+
+    Raises:
+        ConfigError: No such state.
+    """
+    if label not in flow.labels:
+        raise ConfigError(f"there is no state {label!r}: {suggest(label, flow.labels)}")
+    return Section(flow.labels.index(label), threshold)
+
+
+def find_limit_cycle(
+    flow: Flow,
+    state: Array,
+    switches: Switches,
+    section: Section,
+    *,
+    n_phases: int = 100,
+    tolerance: float = 1e-9,
+    perturbation: float = 1e-6,
+    longest_s: float = 60.0,
+    refine: bool = True,
+) -> LimitCycle:
+    """Finds the periodic orbit near a state, and linearises round it.
+
+    The return map of the section is iterated until the orbit closes; where it contracts by less than a half a
+    cycle, Newton's method on the return map takes over. The orbit is then cut into ``n_phases`` arcs. Every state is
+    perturbed both ways at the beginning of every arc; the central differences at the ends are the arcs'
+    state-transition matrices, whose product is the monodromy. The phase response is the left eigenvector of the trivial
+    multiplier, carried round the orbit backwards by the transposed transition matrices (the adjoint method).
+
+    Args:
+        flow: The system.
+        state: Where to begin, in the orbit's basin, ``(1, n_states)``.
+        switches: Switches as they were before, ``(1, n_switches)``.
+        section: The event that ends a cycle.
+        n_phases: Arcs, at least 1.
+        tolerance: Closing error at which the orbit counts as closed, as a share of each state's range.
+        perturbation: Size of a perturbation, as a share of the state's range.
+        longest_s: Longest cycle to wait for, s.
+        refine: Whether steps end where a switch moves; without, the derivative misses the saltations.
+
+    Raises:
+        NoLimitCycle: The section is not met, or the orbit does not close.
+        ConfigError: No arcs, or a perturbation or a tolerance that is not positive.
+    """
+    for name, value in (("n_phases", n_phases), ("tolerance", tolerance), ("perturbation", perturbation)):
+        if not value > 0:
+            raise ConfigError(f"{name} = {value:g} must be greater than 0")
+    _, state, switches = crossing_times(flow, state, switches, section, longest_s, refine=refine)
+    closing, n_returns, newton = np.inf, 0, 0
+    while True:
+        orbit = _first_return(flow, state, switches, section, longest_s, refine)
+        end, last = orbit.state[-1:], orbit.switches[-1:]
+        n_returns += 1
+        before, closing = closing, float((np.abs(end - state) / orbit.range).max())
+        if closing <= tolerance:
+            break
+        if n_returns >= _MOST_RETURNS or newton >= _MOST_NEWTON:
+            raise NoLimitCycle(
+                f"the orbit does not close: after {n_returns} returns to the section its ends differ by {closing:.2g} "
+                f"of a state's range, more than {tolerance:g}"
+            )
+        if refine and (newton or (n_returns > 3 and closing > _SLOW * before)):
+            newton += 1
+            transition = _product(_transitions(flow, orbit, _arcs(orbit, n_phases), perturbation, refine))
+            along = flow.step(end, last)[0][0] - end[0]
+            project = np.eye(state.size)
+            project[:, section.state] -= along / along[section.state]
+            correction = np.linalg.solve(np.eye(state.size) - project @ transition, (end - state)[0])
+            end = state + correction
+            end[:, section.state] = section.threshold
+        state, switches = end, last
+    arcs = _arcs(orbit, n_phases)
+    transitions = _transitions(flow, orbit, arcs, perturbation, refine)
+    monodromy = _product(transitions)
+    multipliers, eigenvectors, adjoint = _decomposed(monodromy, orbit.range)
+    state, switches = orbit.state[arcs], orbit.switches[arcs]
+    velocity = (flow.step(state, switches)[0] - state) / flow.timestep_s
+    carried = accumulate(transitions[::-1], lambda later, transition: transition.T @ later, initial=adjoint)
+    response = np.array([*carried][::-1])
+    return LimitCycle(
+        labels=flow.labels,
+        period_s=float(orbit.time[-1] * flow.timestep_s),
+        timestep_s=flow.timestep_s,
+        section=section,
+        closing_error=closing,
+        n_returns=n_returns,
+        time_s=orbit.time[arcs] * flow.timestep_s,
+        state=state,
+        switches=switches,
+        switch_time_s=orbit.time[orbit.moved] * flow.timestep_s,
+        range=orbit.range,
+        transitions=transitions,
+        monodromy=monodromy,
+        multipliers=multipliers,
+        eigenvectors=eigenvectors,
+        trivial=int(np.argmin(np.abs(multipliers - 1.0))),
+        phase_response=response / (response * velocity).sum(axis=1, keepdims=True),
+    )
+
+
+@dataclass(slots=True)
+class _Orbit:
+    """Every step of one cycle: instants (in steps), states and switches there, and when switches moved."""
+
+    time: Array
+    state: Array
+    switches: Switches
+    moved: NDArray[np.intp]
+
+    @property
+    def range(self) -> Array:
+        """Peak to peak of every state, 1 for one that does not move."""
+        range_ = np.ptp(self.state, axis=0)
+        return np.where(range_ > 0.0, range_, 1.0)
+
+
+def crossing_times(
+    flow: Flow,
+    state: Array,
+    before: Switches,
+    section: Section,
+    longest_s: float,
+    *,
+    count: int = 1,
+    refine: bool = True,
+) -> tuple[Array, Array, Switches]:
+    """Lets copies run, from where `travel` would, until they have met the section ``count`` times.
+
+    Returns:
+        Times, s, ``(n_copies,)``; states and switches there.
+
+    Raises:
+        NoLimitCycle: A copy has not met it so often in ``longest_s``.
+    """
+    here = Copies.at(flow, state, before)
+    end, times = here[np.arange(len(state))], np.zeros(len(state))
+    for rows, _, there, taken, final in _steps_to(flow, here, section, longest_s, count, refine):
+        times[rows] += taken * flow.timestep_s
+        end[rows[final]] = there[final]
+    return times, end.state, end.switches
+
+
+def _first_return(
+    flow: Flow, state: Array, before: Switches, section: Section, longest_s: float, refine: bool
+) -> _Orbit:
+    """One copy from the section back to it, step by step."""
+    start = Copies.at(flow, state, before)
+    time, states, switches, moved = [0.0], [start.state[0]], [start.switches[0]], []
+    for _, here, there, taken, final in _steps_to(flow, start, section, longest_s, 1, refine):
+        if not final[0] and (there.switches != here.switches).any():
+            moved.append(len(time))
+        time.append(time[-1] + float(taken[0]))
+        states.append(there.state[0])
+        switches.append(there.switches[0])
+    return _Orbit(np.array(time), np.array(states), np.array(switches), np.array(moved, dtype=np.intp))
+
+
+def _steps_to(
+    flow: Flow, here: Copies, section: Section, longest_s: float, count: int, refine: bool
+) -> Iterator[tuple[NDArray[np.intp], Copies, Copies, Array, NDArray[np.bool_]]]:
+    """Steps copies until they have met the section ``count`` times, on which their last steps end.
+
+    Yields at every step which copies take it, where it begins and ends, its share of a whole step, and which are done.
+    """
+    rows, times, counts = np.arange(len(here.state)), np.zeros(len(here.state)), np.zeros(len(here.state), dtype=int)
+    while rows.size:
+        if times[rows].max() > longest_s:
+            raise NoLimitCycle(
+                f"{flow.labels[section.state]} does not rise through {section.threshold:g} "
+                f"{'' if count == 1 else f'{count} times '}within {longest_s:g} s: "
+                "choose another threshold or neuron, or a worm that oscillates"
+            )
+        there, taken = advance(flow, here, np.ones(rows.size), refine)
+        low, high = here.state[:, section.state], there.state[:, section.state]
+        met = (low < section.threshold) & (high >= section.threshold)
+        counts[rows] += met
+        final = met & (counts[rows] == count)
+        if final.any():
+            there[final], taken[final] = _stop(flow, section, here[final], taken[final])
+        yield rows, here, there, taken, final
+        times[rows] += taken * flow.timestep_s
+        rows, here = rows[~final], there[~final]
+
+
+def _stop(flow: Flow, section: Section, here: Copies, share: Array) -> tuple[Copies, Array]:
+    """Ends steps on the section, which they meet within the share given; returns the share taken."""
+    share = first_share(flow, here, share, lambda state: state[:, section.state] >= section.threshold)
+    state = here.part(flow, share)
+    # On the section to the last bit, so that a copy that starts from here does not meet it at once.
+    state[:, section.state] = section.threshold
+    return Copies.at(flow, state, here.switches), share
+
+
+def _arcs(orbit: _Orbit, n_phases: int) -> NDArray[np.intp]:
+    """Indices of the steps between which the arcs lie: even in time, at whole steps, and none beside a switch."""
+    last = len(orbit.time) - 1
+    allowed = np.ones(last, dtype=bool)
+    for offset in (-1, 0, 1):
+        allowed[np.clip(orbit.moved + offset, 1, last - 1)] = False
+    allowed[0] = True
+    candidates = np.flatnonzero(allowed)
+    wanted = orbit.time[-1] * np.arange(n_phases) / n_phases
+    nearest = np.searchsorted(orbit.time[candidates], wanted)
+    return np.append(np.unique(candidates[np.minimum(nearest, len(candidates) - 1)]), last)
+
+
+def _transitions(flow: Flow, orbit: _Orbit, arcs: NDArray[np.intp], perturbation: float, refine: bool) -> Array:
+    """State-transition matrices of the arcs by central differences, ``(n_arcs, n_states, n_states)``."""
+    size = perturbation * orbit.range
+    kicks = np.concatenate([np.diag(size), -np.diag(size)])
+    duration_s = np.diff(orbit.time[arcs]) * flow.timestep_s
+    ends = np.empty((len(duration_s), *kicks.shape))
+    at_once = max(1, _MOST_COPIES // len(kicks))
+    for first in range(0, len(duration_s), at_once):
+        some = slice(first, first + at_once)
+        starts = orbit.state[arcs[:-1][some], np.newaxis] + kicks
+        switches = orbit.switches[arcs[:-1][some]].repeat(len(kicks), axis=0)
+        durations = duration_s[some].repeat(len(kicks))
+        end = travel(flow, starts.reshape(-1, size.size), switches, durations, refine=refine)
+        ends[some] = end.state.reshape(starts.shape)
+    plus, minus = ends[:, : size.size], ends[:, size.size :]
+    return ((plus - minus) / (2.0 * size[:, np.newaxis])).transpose(0, 2, 1)
+
+
+def _product(transitions: Array) -> Array:
+    """State-transition matrix of a whole period: the product of those of its arcs."""
+    return reduce(lambda product, transition: transition @ product, transitions, np.eye(transitions.shape[1]))
+
+
+def _decomposed(monodromy: Array, scale: Array) -> tuple[NDArray[np.complex128], NDArray[np.complex128], Array]:
+    """Multipliers and right eigenvectors, as `LimitCycle` has them, and the left eigenvector of the trivial one."""
+    scaled = monodromy * scale / scale[:, np.newaxis]
+    multipliers, vectors = np.linalg.eig(scaled)
+    order = np.argsort(-np.abs(multipliers), kind="stable")
+    multipliers, vectors = multipliers[order].astype(complex), vectors[:, order].astype(complex)
+    of_left, left = np.linalg.eig(scaled.T)
+    adjoint = np.real(left[:, np.argmin(np.abs(of_left - 1.0))]) / scale
+    return multipliers, (scale[:, np.newaxis] * vectors).astype(complex), adjoint
+
+
+def kicked_phase_response(
+    flow: Flow, cycle: LimitCycle, kicks: Array, phases: NDArray[np.intp], *, n_cycles: int = 3, longest_s: float = 60.0
+) -> Array:
+    """Measures phase response directly: kicks the system at a phase, and sees when it next meets the section.
+
+    Args:
+        flow: The system of the cycle.
+        cycle: Its limit cycle.
+        kicks: What is added to the states at once, ``(n_kicks, n_states)``; any size.
+        phases: Indices into the cycle's instants, ``(n_kicked,)``.
+        n_cycles: Which meeting with the section to compare, from 1; by then only the kick's phase should be left.
+        longest_s: Longest cycle to wait for, s.
+
+    Returns:
+        Advance of each phase by each kick, s, ``(n_kicked, n_kicks)``, within half a period of 0.
+    """
+    plain = np.zeros((1, kicks.shape[1]))
+    state = (cycle.state[phases, np.newaxis] + np.concatenate([plain, kicks])).reshape(-1, kicks.shape[1])
+    switches = cycle.switches[phases].repeat(len(kicks) + 1, axis=0)
+    times, _, _ = crossing_times(flow, state, switches, cycle.section, n_cycles * longest_s, count=n_cycles)
+    times = times.reshape(len(phases), -1)
+    advance_s = times[:, :1] - times[:, 1:]
+    return advance_s - cycle.period_s * np.round(advance_s / cycle.period_s)

@@ -1,0 +1,36 @@
+"""Oscillators as controllers: a stable heteroclinic channel, and a chain of phase oscillators."""
+
+from annelid_studies.oscillators.controllers import HeteroclinicController, PhaseChainController
+from annelid_studies.oscillators.phase_chain import (
+    DriveResponse,
+    PhaseNetwork,
+    PhaseState,
+    PhaseStepper,
+    phase_chain,
+    steady_lags,
+)
+from annelid_studies.oscillators.shc import (
+    HeteroclinicRing,
+    HeteroclinicStepper,
+    bias_dwell_s,
+    handover_input,
+    largest_gain_per_s,
+    noise_dwell_s,
+)
+
+__all__ = [
+    "DriveResponse",
+    "HeteroclinicController",
+    "HeteroclinicRing",
+    "HeteroclinicStepper",
+    "PhaseChainController",
+    "PhaseNetwork",
+    "PhaseState",
+    "PhaseStepper",
+    "bias_dwell_s",
+    "handover_input",
+    "largest_gain_per_s",
+    "noise_dwell_s",
+    "phase_chain",
+    "steady_lags",
+]

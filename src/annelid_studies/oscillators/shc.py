@@ -1,0 +1,173 @@
+"""Stable heteroclinic channel: a ring of saddles that is visited in order, with a dwell time that noise or input sets.
+
+Node i of N has an activity x_i >= 0 of unit size (Lotka-Volterra competition; Horchler, Daltorio, Chiel and Quinn
+2015, "Designing responsive pattern generators: stable heteroclinic channel cycles for modeling and control"):
+
+    dx_i = x_i (alpha - sum_j rho_ij x_j) dt + mu_i dt + epsilon dW_i,   reflected at 0.
+
+With rho_ii = alpha every x = e_i is a saddle, near which x_j grows at the rate alpha - rho_ji: here alpha / nu for the
+successor of i (its only unstable direction, lambda_u) and -alpha for all others (so lambda_s = alpha). The ring of
+saddles attracts for a saddle value nu = lambda_s / lambda_u above 1.
+
+Near e_i the successor obeys dx = (lambda_u x + mu) dt + epsilon dW, reflected at 0, starting from its value while it
+decayed at the rate lambda_s. Its exponentially growing part has, without noise, the amplitude
+mu (1/lambda_u + 1/lambda_s); without mu, it is the modulus of a Gaussian of variance
+epsilon^2 (1/lambda_u + 1/lambda_s) / 2. From this follow the dwell times below.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from annelid.errors import ConfigError, require_at_least, require_positive
+from annelid.protocols import Array
+
+
+@dataclass(frozen=True, slots=True)
+class HeteroclinicRing:
+    """A ring of ``n_nodes`` saddles 1-2-..-N-1.
+
+    Attributes:
+        n_nodes: Number of nodes N, at least 3.
+        growth_rate_per_s: alpha, 1/s; a node's activity also settles and decays at this rate.
+        saddle_value: nu, above 1: how many times faster trajectories are drawn in than they leave.
+
+    Raises:
+        ConfigError: Fewer than 3 nodes, a rate that is not positive, or a saddle value of at most 1.
+    """
+
+    n_nodes: int
+    growth_rate_per_s: float = 20.0
+    saddle_value: float = 2.0
+
+    def __post_init__(self) -> None:
+        require_at_least(3, n_nodes=self.n_nodes)
+        require_positive(growth_rate_per_s=self.growth_rate_per_s)
+        if not self.saddle_value > 1:
+            raise ConfigError(f"saddle_value must be greater than 1, not {self.saddle_value}: else the ring repels")
+
+    @property
+    def leaving_rate_per_s(self) -> float:
+        """lambda_u, the rate at which a node's successor grows, 1/s."""
+        return self.growth_rate_per_s / self.saddle_value
+
+    def competition(self) -> Array:
+        """Returns rho, 1/s: ``rho[i, j]`` is how much node j slows the growth of node i, ``(n_nodes, n_nodes)``."""
+        alpha = self.growth_rate_per_s
+        rho = np.full((self.n_nodes, self.n_nodes), 2.0 * alpha)
+        np.fill_diagonal(rho, alpha)
+        node = np.arange(self.n_nodes)
+        rho[(node + 1) % self.n_nodes, node] = alpha - self.leaving_rate_per_s
+        return rho
+
+
+def noise_dwell_s(ring: HeteroclinicRing, noise: ArrayLike, distance: ArrayLike = 0.5) -> Array:
+    """Returns the mean time, s, that noise alone takes to leave a node, in the limit of small noise.
+
+    ``<T> = (ln(delta / epsilon) + (gamma + ln(4 lambda_u lambda_s / (lambda_u + lambda_s))) / 2) / lambda_u`` with
+    Euler's gamma, as ``<ln|Z|> = -(gamma + ln 2) / 2`` for a standard normal Z (Stone and Holmes 1990, "Random
+    perturbations of heteroclinic attractors", eq. 2.28). Its standard deviation is ``pi / (sqrt(8) lambda_u)``.
+
+    Args:
+        ring: The ring.
+        noise: epsilon, 1/sqrt(s), any shape.
+        distance: delta, the successor's activity that counts as having left, small beside 1.
+    """
+    leave, settle = ring.leaving_rate_per_s, ring.growth_rate_per_s
+    constant = 0.5 * (np.euler_gamma + np.log(4.0 * leave * settle / (leave + settle)))
+    return (np.log(np.asarray(distance) / np.asarray(noise)) + constant) / leave
+
+
+def bias_dwell_s(ring: HeteroclinicRing, bias_per_s: ArrayLike, distance: ArrayLike = 0.5) -> Array:
+    """Returns the time, s, that a constant input alone takes to leave a node, in the limit of a small one.
+
+    ``T = ln(delta lambda_u lambda_s / (mu (lambda_u + lambda_s))) / lambda_u``.
+
+    Args:
+        ring: The ring.
+        bias_per_s: mu, 1/s, any shape.
+        distance: delta, as for `noise_dwell_s`.
+    """
+    leave, settle = ring.leaving_rate_per_s, ring.growth_rate_per_s
+    reach = np.asarray(distance) * leave * settle / (leave + settle)
+    return np.log(reach / np.asarray(bias_per_s)) / leave
+
+
+def largest_gain_per_s(ring: HeteroclinicRing) -> float:
+    """Gain of `handover_input`, 1/s, from which a ring with every cue on can rest between its nodes; may be infinite.
+
+    With mu_i = k x_{i-1} the ring has a fixed point with all nodes alike, x = (alpha + k) / (alpha s) with
+    s = 2 N - 2 - 1/nu. A perturbation that turns by the angle t = 2 pi / N from node to node grows there at the rate
+    -k (1 - cos t) + x alpha (1 + (1 + 1/nu) cos t), which is negative beyond
+
+        k = alpha A / (1 - A),    A = (1 + (1 + 1/nu) cos t) / (s (1 - cos t)).
+    """
+    cosine, over = np.cos(2.0 * np.pi / ring.n_nodes), 1.0 + 1.0 / ring.saddle_value
+    # Larger turns have smaller cosines and decay before this one does.
+    share = (1.0 + over * cosine) / ((2.0 * ring.n_nodes - 1.0 - over) * (1.0 - cosine))
+    return ring.growth_rate_per_s * share / (1.0 - share) if share < 1.0 else float("inf")
+
+
+class HeteroclinicStepper:
+    """Advances any number of copies of a ring.
+
+    One step multiplies each activity by the exponential of its growth rate times the step, which keeps the rates at
+    the saddles exact, then adds input and noise (Euler-Maruyama) and reflects at 0.
+
+    Raises:
+        ConfigError: A time step of more than half of 1 / growth_rate_per_s.
+    """
+
+    def __init__(self, ring: HeteroclinicRing, timestep_s: float) -> None:
+        """Prepares a step.
+
+        Args:
+            ring: The ring.
+            timestep_s: Step, s.
+        """
+        if not 0 < timestep_s * ring.growth_rate_per_s <= 0.5:
+            raise ConfigError(
+                f"a time step of {timestep_s:g} s does not fit growth_rate_per_s = {ring.growth_rate_per_s:g}: "
+                f"it must be in 0 .. {0.5 / ring.growth_rate_per_s:g} s"
+            )
+        self.ring = ring
+        self.timestep_s = timestep_s
+        self._competition = ring.competition().T.copy()
+
+    def initial_state(self, n_networks: int = 1) -> Array:
+        """Returns copies that rest at node 1, ``(n_networks, n_nodes)``."""
+        state = np.zeros((n_networks, self.ring.n_nodes))
+        state[:, 0] = 1.0
+        return state
+
+    def advance(self, state: Array, input_per_s: ArrayLike = 0.0, kick: ArrayLike = 0.0) -> Array:
+        """Returns the activities one step on.
+
+        Args:
+            state: Activities, ``(n_networks, n_nodes)``.
+            input_per_s: mu, 1/s, broadcast to that shape.
+            kick: epsilon times standard normal numbers, 1/sqrt(s), likewise; 0 without noise.
+
+        Returns:
+            Shape ``(n_networks, n_nodes)``; no activity is negative.
+        """
+        dt = self.timestep_s
+        grown = state * np.exp(dt * (self.ring.growth_rate_per_s - state @ self._competition))
+        return np.abs(grown + dt * np.asarray(input_per_s) + np.sqrt(dt) * np.asarray(kick))
+
+
+def handover_input(state: Array, cue: ArrayLike, gain_per_s: float) -> Array:
+    """Returns the input that excites the successor of every node whose segment gives its cue.
+
+    Args:
+        state: Activities, ``(n_networks, n_nodes)``.
+        cue: 1 for every node whose successor may take over, else 0; broadcast to that shape.
+        gain_per_s: Input to the successor of a fully active node, 1/s.
+
+    Returns:
+        mu, 1/s, ``(n_networks, n_nodes)``: ``gain x_{i-1} cue_{i-1}`` at node i.
+    """
+    return gain_per_s * np.roll(state * np.asarray(cue), 1, axis=-1)

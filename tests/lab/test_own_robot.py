@@ -1,0 +1,216 @@
+"""Robots of one's own: read as data, driven and sensed by the names in their files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import annelid
+from annelid.body.assemble import mjcf_text
+from annelid.config import RunConfig, load_config
+from annelid.errors import ConfigError
+from annelid.protocols import Sensation
+from annelid_lab.robots.body import EXAMPLE, MjcfBody
+from annelid_lab.robots.plant import MjcfPlant
+
+ROBOT = Path(__file__).parents[2] / "examples" / "robot" / "robot.xml"
+FLOOR = '<geom name="floor" type="plane" size="5 5 1"/>'
+
+
+def robot(xml: str = EXAMPLE, changes: dict[str, Any] | None = None, **body: Any) -> RunConfig:
+    """A configuration of a robot with steps of 2 ms."""
+    body = {"kind": "mjcf", "xml": xml, **body}
+    return load_config({"body": body, "clock": {"physics_timestep_s": 0.002}}, changes)
+
+
+def plant_of(config: RunConfig) -> MjcfPlant:
+    """The robot of a configuration."""
+    assert isinstance(config.body, MjcfBody)
+    return MjcfPlant(config.body, config)
+
+
+def held(plant: MjcfPlant, activation: float, n_steps: int) -> Sensation:
+    """What a robot senses after so many steps under one activation of all its actuators."""
+    sensed = plant.reset(0)
+    for _ in range(n_steps):
+        sensed = plant.step(np.full(plant.n_muscles, activation))
+    return sensed
+
+
+def one_motor(motor: str, joint: str = "") -> str:
+    """A robot of one mass that a motor pulls towards the world along x."""
+    return (
+        '<mujoco><compiler autolimits="true"/><option gravity="0 0 0"/><worldbody><body pos="0.5 0 0">'
+        f'<joint name="s" type="slide" axis="1 0 0" {joint}/><geom size="0.05" mass="2"/></body></worldbody>'
+        f'<actuator>{motor}</actuator><sensor><jointpos name="stretch_1" joint="s"/></sensor></mujoco>'
+    )
+
+
+def test_a_file_is_a_whole_robot_with_its_ground_and_its_step() -> None:
+    config = load_config(ROBOT)
+    assert isinstance(config.body, MjcfBody)
+    assert (config.name, config.body.n_segments, config.arena) == ("robot", 3, None)
+    assert config.clock.physics_timestep_s == 0.005
+    plant = plant_of(config)
+    assert (plant.n_segments, plant.n_muscles, plant.total_mass_kg) == (3, 3, pytest.approx(0.8))
+    assert plant.length_m == pytest.approx(0.3)
+    assert plant.reset(0).heading == pytest.approx([-1.0, 0.0, 0.0])
+
+
+def test_the_papers_worm_from_its_mjcf_moves_as_the_papers_worm(tmp_path: Path) -> None:
+    """The oracle is the body that wrote the file; MJCF holds six digits."""
+    fewer = {"body.mesh.n_helices": 6, "body.mesh.elements_per_side": 1, "duration_s": 0.2}
+    own = load_config("riddle2023", fewer)
+    (tmp_path / "worm.xml").write_text(mjcf_text(own))
+    tree = own.model_dump(exclude_none=True) | MjcfBody.from_file(tmp_path / "worm.xml")
+    for name in ("arena", "published"):
+        tree.pop(name, None)
+    tree["body"] |= {"first_segment": 0, "sensors": [f"stretch_{{segment}}_{i}" for i in range(3)]}
+    there, here = (
+        annelid.simulate(config, tmp_path / name, progress=False).data
+        for name, config in (("own", own), ("read", load_config(tree)))
+    )
+    for name in ("stretch_length", "ring_length", "center_of_mass"):
+        assert here[name].values == pytest.approx(there[name].values, abs=1e-4), name
+    assert np.ptp(there["ring_length"].values) > 0.05
+    weight_N = 9.81 * there.attrs["total_mass_kg"]
+    assert here["contact_force"].values[-1, :, 2].sum() == pytest.approx(weight_N, rel=0.5)
+
+
+@pytest.mark.parametrize(
+    ("motor", "joint", "force_N"),
+    [
+        ('<motor name="ring_1" joint="s" ctrlrange="-3 1"/>', "", 3.0),
+        ('<motor name="ring_1" joint="s" gear="-2" ctrlrange="0 3"/>', "", 6.0),
+        ('<general name="ring_1" joint="s" gainprm="-4" ctrlrange="0 1"/>', "", 4.0),
+        (
+            '<muscle name="ring_1" joint="s" force="5" ctrlrange="0 1" lengthrange="-0.25 0.05" timeconst=".01 .01"/>',
+            'armature="1e4"',
+            5.0,
+        ),
+        ('<position name="ring_1" joint="s" kp="10" ctrlrange="-0.2 0.1"/>', 'damping="1e5"', 2.0),
+    ],
+)
+def test_activation_goes_from_rest_to_the_hardest_pull(motor: str, joint: str, force_N: float) -> None:
+    plant = plant_of(robot(one_motor(motor, joint)))
+    at_rest = held(plant, 0.0, 100)
+    assert at_rest.muscle_force_N == pytest.approx([-1.0 if "position" in motor else 0.0], abs=0.01)
+    pulled = held(plant, 1.0, 100)
+    assert pulled.muscle_force_N == pytest.approx([force_N], rel=0.02)
+    assert pulled.stretch_m[0, 0] < 0.0
+
+
+def test_the_ground_carries_the_robot_at_rest() -> None:
+    plant = plant_of(robot())
+    sensed = held(plant, 0.0, 2000)
+    assert sensed.contact_force_N[:, 2].sum() == pytest.approx(0.8 * 9.81, rel=0.01)
+    assert plant.alarm() is None
+
+
+def test_a_run_goes_on_to_the_last_bit(tmp_path: Path) -> None:
+    config = load_config(ROBOT, {"duration_s": 0.6, "sensor.tolerance_m": 0.005})
+    whole = annelid.simulate(config, tmp_path / "whole", progress=False).data
+    first = annelid.simulate(config.model_copy(update={"duration_s": 0.3}), tmp_path / "a", progress=False)
+    rest = annelid.simulate(config, tmp_path / "b", resume=first, progress=False).data
+    for name in ("stretch_length", "muscle_force", "contact_force", "kinetic_energy"):
+        assert np.array_equal(rest[name].values, whole[name].values[-len(rest["time"]) :]), name
+    assert np.ptp(whole["stretch_length"].values) > 0.01
+
+
+def test_a_guard_stops_a_robot_that_flies_off() -> None:
+    plant = plant_of(robot(one_motor('<motor name="ring_1" joint="s" ctrlrange="-900 0"/>')))
+    held(plant, 1.0, 60)
+    assert "kinetic energy" in (plant.alarm() or "")
+
+
+def test_a_cable_of_mujoco_3_sags_as_a_beam(tmp_path: Path) -> None:
+    """Euler and Bernoulli: the tip of a cantilever sinks by w L^4 / (8 E I) under its own weight w a metre."""
+    n, mass_kg, modulus_Pa = 40, 0.06, 8e9
+    vertices = " ".join(f"{x:.9g} 0 1" for x in np.linspace(0.0, 1.0, n + 1))
+    (tmp_path / "beam.xml").write_text(
+        '<mujoco><extension><plugin plugin="mujoco.elasticity.cable"/></extension><size memory="4G"/>'
+        '<compiler autolimits="true"/><option integrator="implicitfast" timestep="0.005"/><worldbody>'
+        f'<composite type="cable" prefix="c" initial="none" vertex="{vertices}">'
+        '<plugin plugin="mujoco.elasticity.cable"><config key="bend" value="8e9"/><config key="twist" value="4e8"/>'
+        '</plugin><joint kind="main" damping="2"/><geom size="0.005" contype="0" conaffinity="0" mass="0.0015"/>'
+        '</composite><body pos="0 0 2"><joint name="pulled"/><geom size="0.1"/></body></worldbody>'
+        '<actuator><motor name="ring_1" joint="pulled" ctrlrange="-1 0"/></actuator>'
+        '<sensor><jointpos name="stretch_1" joint="pulled"/></sensor></mujoco>'
+    )
+    plant = plant_of(load_config(tmp_path / "beam.xml"))
+    held(plant, 0.0, 4000)
+    last = plant.data.body("cB_last")
+    tip_m = last.xpos + last.xmat.reshape(3, 3)[:, 0] / n
+    bending = modulus_Pa * np.pi * 0.005**4 / 4
+    # The first element is clamped, and the hinge at its end bends for half of it.
+    free_m = 1.0 - 0.5 / n
+    assert 1.0 - tip_m[2] == pytest.approx(mass_kg * 9.81 * free_m**4 / (8 * bending), rel=0.01)
+
+
+REFUSED = {
+    "no segment": (
+        EXAMPLE,
+        {"actuators": ["pull_{segment}"]},
+        "no actuator named pull_1; it has ring_1, ring_2, ring_3",
+    ),
+    "no sensor": (EXAMPLE, {"sensors": ["s_{segment}"]}, "no sensor named 's_1'; it has stretch_1"),
+    "no place": (EXAMPLE, {"actuators": ["ring"]}, r"must have \{segment\} once"),
+    "no actuator": (
+        '<mujoco><worldbody><geom size="1"/></worldbody></mujoco>',
+        {},
+        "no actuator named ring_1; it has none",
+    ),
+    "include": ('<mujoco><include file="/etc/passwd"/></mujoco>', {}, "write its content into the file"),
+    "plug-in": ('<mujoco><extension><plugin plugin="x"/></extension></mujoco>', {}, "plug-ins are code"),
+    "busy engine": ('<mujoco><option iterations="1000000"/></mujoco>', {}, "at most 10000"),
+    "path in a name": (EXAMPLE.replace('"head"', '"../head"'), {}, "without '/'"),
+    "callback": (EXAMPLE.replace("<position name", "<user name"), {}, "<actuator> has <user>"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_no_robot_can_have_is_refused_in_a_sentence(case: str) -> None:
+    xml, fields, words = REFUSED[case]
+    with pytest.raises(ConfigError, match=words):
+        robot(xml, **fields)
+
+
+@pytest.mark.parametrize(
+    ("xml", "words"),
+    [
+        (one_motor('<motor name="ring_1" joint="s"/>'), "'ring_1' has no ctrlrange"),
+        (one_motor('<motor name="ring_1" joint="s" ctrlrange="0 1"/>'), "'ring_1' cannot pull"),
+        (one_motor('<motor name="ring_1" joint="t" ctrlrange="0 1"/>'), "the engine refuses the robot: .*unknown"),
+    ],
+)
+def test_an_actuator_that_is_no_ring_is_refused(xml: str, words: str) -> None:
+    with pytest.raises(ConfigError, match=words):
+        plant_of(robot(xml))
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('<composite type="grid" prefix="c" count="9 9 1"/>', "only a cable"),
+        ('<composite type="cable" prefix="c" vertex="0 0 0 1 1"/>', "three numbers"),
+        (f'<composite type="cable" prefix="c" vertex="{"1 " * 9}"/>', "no two vertices alike"),
+        (f'<composite type="cable" prefix="c" vertex="{"x " * 9}"/>', "must be numbers"),
+        (f'<composite type="cable" prefix="c" vertex="{"1 " * 900}"/>', "of each of 3 to 180 places"),
+        ('<composite type="cable" prefix="c" vertex="0" quat="1 0 0 0"/>', "<composite quat=..>: a cable cannot"),
+        ('<composite type="cable" prefix="c" vertex="0"><plugin plugin="x"/></composite>', "others are code"),
+    ],
+)
+def test_a_composite_that_is_no_cable_is_refused(tmp_path: Path, text: str, words: str) -> None:
+    (tmp_path / "c.xml").write_text(f"<mujoco><worldbody>{FLOOR}{text}</worldbody></mujoco>")
+    with pytest.raises(ConfigError, match=words):
+        load_config(tmp_path / "c.xml")
+
+
+def test_the_section_has_its_own_ground() -> None:
+    with pytest.raises(ConfigError, match=r"arena has no effect on body\.kind = 'mjcf'"):
+        robot(changes={"arena.kind": "floor"})
+    with pytest.raises(ConfigError, match=r"trial.push_N = 1: body.kind = 'mjcf' cannot be pushed"):
+        robot(changes={"trial.push_N": 1.0})

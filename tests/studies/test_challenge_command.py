@@ -1,0 +1,42 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from outcome import Command
+
+MINE = "[mine]\ncontroller = {kind = 'sine'}\ntuned_on = [0, 1001]\n"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (("nobody",), "unknown entrant 'nobody'"),
+        (("mine.toml",), "tuned_on has test seeds (all tasks: 1001): tune on seeds below 1000"),
+        (("none:Controller",), "none cannot be imported"),
+        (("--task", "slop"), "unknown task 'slop': did you mean 'slope'?"),
+        (("--against", "none.csv"), "none.csv is no runs.csv"),
+        (("--with", "none.csv"), "none.csv is no runs.csv"),
+    ],
+)
+def test_what_cannot_be_ranked_is_refused_in_a_sentence(
+    annelid: Command, arguments: tuple[str, ...], says: str
+) -> None:
+    Path("mine.toml").write_text(MINE, encoding="utf-8")
+    done = annelid("study", "challenge", *arguments, "--quiet")
+    assert done.exit_code == 2
+    assert says in done.sentence()
+    assert not list(Path().glob("challenge/runs/*"))
+
+
+@pytest.mark.slow
+def test_two_quick_rankings_are_identical(annelid: Command) -> None:
+    for folder in ("one", "two"):
+        done = annelid("study", "challenge", "--quick", "-o", folder)
+        assert done.exit_code == 0, done.err
+        assert "speed" in done.out
+    names = ("runs.csv", "scores.csv", "tasks.csv", "challenge.png", "challenge.svg")
+    assert done.out.splitlines()[-4:] == [str(Path("two", name)) for name in names[:4]]
+    for name in names:
+        assert Path("one", name).read_bytes() == Path("two", name).read_bytes()

@@ -1,0 +1,105 @@
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from outcome import Command
+
+
+def test_load_frame_writes_a_table_and_its_picture(annelid: Command) -> None:
+    done = annelid("study", "load-frame", "--displacement", "90", "--cable-friction", "1.0", "-o", "frame")
+    assert done.exit_code == 0, done.err
+    assert "work lost" in done.out
+    assert done.out.splitlines()[-2:] == [str(Path("frame/load_frame.csv")), str(Path("frame/load_frame.png"))]
+    assert Path("frame/load_frame.svg").exists()
+    table = np.genfromtxt("frame/load_frame.csv", delimiter=",", names=True)
+    assert table["displacement_mm"].max() == pytest.approx(90, abs=2)
+    turn = int(table["displacement_mm"].argmax())
+    assert table["force_N"][turn] == pytest.approx(table["tension_N"][turn] / (1 - np.exp(-1.0)), rel=1e-4)
+    assert table["force_N"][-2] == pytest.approx(table["tension_N"][-2] / (np.exp(1.0) - 1), rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (("study", "load-frame", "riddle2022-planar"), "no ring cable"),
+        (("study", "load-frame", "--displacement", "2000"), "four fifths"),
+        (("study", "load-frame", "--data", "none.csv"), "cannot read none.csv"),
+        (("calibrate", "--free", "yuong_modulus"), "did you mean 'young_modulus'"),
+        (("calibrate", "none.toml"), "cannot read the study none.toml"),
+    ],
+)
+def test_bad_input_ends_in_one_sentence(annelid: Command, arguments: tuple[str, ...], says: str) -> None:
+    done = annelid(*arguments, "--quiet")
+    assert done.exit_code == 2
+    assert says in done.sentence()
+    assert not list(Path().iterdir())
+
+
+def test_results_are_kept_unless_forced(annelid: Command) -> None:
+    for folder, file, command in (
+        ("a", "load_frame.csv", ("study", "load-frame")),
+        ("b", "calibration.json", ("calibrate",)),
+    ):
+        Path(folder).mkdir()
+        Path(folder, file).write_text("mine")
+        assert "exists" in annelid(*command, "-o", folder, "--quiet").sentence()
+        assert Path(folder, file).read_text() == "mine"
+
+
+@pytest.mark.parametrize("study", ["weak-middle", "turning"])
+def test_a_study_needs_a_folder(annelid: Command, study: str) -> None:
+    Path("taken").write_text("mine")
+    done = annelid("study", study, "-o", "taken")
+    assert done.exit_code == 2
+    assert "taken is a file" in done.sentence()
+    assert Path("taken").read_text() == "mine"
+
+
+def test_an_unknown_figure_is_refused_with_the_nearest(annelid: Command) -> None:
+    done = annelid("draw", "nowhere", "--figure", "trak")
+    assert done.exit_code == 2
+    assert "unknown figure 'trak': did you mean 'track'?" in done.sentence()
+
+
+@pytest.mark.slow
+def test_the_weak_middle_is_kept_and_told_again(annelid: Command) -> None:
+    first = annelid("study", "weak-middle", "--quick", "-o", "weak", "--quiet")
+    assert first.exit_code == 0, first.err
+    assert first.out.splitlines() == [str(Path("weak/weak_middle.csv")), str(Path("weak/weak_middle.png"))]
+    table = Path("weak/weak_middle.csv").read_bytes()
+    runs = {path: path.stat().st_mtime_ns for path in Path("weak/runs").glob("*/run.nc")}
+    again = annelid("study", "weak-middle", "--quick", "-o", "weak")
+    assert again.exit_code == 0, again.err
+    assert "force-limited" in again.out
+    assert Path("weak/weak_middle.csv").read_bytes() == table
+    assert {path: path.stat().st_mtime_ns for path in Path("weak/runs").glob("*/run.nc")} == runs
+
+
+STUDIES = ("weak-middle", "turning", "speed", "gaits", "slip", "slip-detector", "pipes", "riddle2025")
+
+
+@pytest.mark.parametrize("command", STUDIES)
+def test_a_file_in_place_of_the_folder_of_runs_is_refused(annelid: Command, command: str) -> None:
+    Path("taken").write_text("mine", encoding="utf-8")
+    done = annelid("study", command, "-o", "taken", "--quiet")
+    assert done.exit_code != 0
+    assert "taken is a file: name a folder" in done.sentence()
+    assert Path("taken").read_text(encoding="utf-8") == "mine"
+
+
+@pytest.mark.slow
+def test_both_studies_of_slip_keep_their_runs_in_one_folder(annelid: Command) -> None:
+    done = annelid("study", "slip", "--quick", "-o", "s")
+    assert done.exit_code == 0, done.err
+    assert done.out.splitlines()[-2:] == [str(Path("s/slip.csv")), str(Path("s/slip.png"))]
+    runs = {path.name for path in Path("s/runs").iterdir()}
+    done = annelid("study", "slip-detector", "--quick", "-o", "s")
+    assert done.exit_code == 0, done.err
+    assert {path.name for path in Path("s/runs").iterdir()} > runs, "at frictions that were not drawn"
+    for row in csv.DictReader(Path("s/slip_detector.csv").read_text(encoding="utf-8").splitlines()):
+        assert float(row["precision"]) > 2 * float(row["base_rate"]), "far better than a blind guess"
+        assert float(row["recall"]) > 0.5

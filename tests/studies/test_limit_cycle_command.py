@@ -1,0 +1,67 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from outcome import Command
+
+
+@pytest.mark.slow
+def test_prints_period_and_multipliers_and_draws(annelid: Command) -> None:
+    done = annelid(
+        "study", "limit-cycle", "riddle2022-planar", "--segments", "4", "--time", "located", "-o", "cycle.png"
+    )
+    assert done.exit_code == 0, done.err
+    assert "4 segments: limit cycle in 28 states" in done.out
+    period = next(line.split()[-1] for line in done.out.splitlines() if "period (ms)" in line)
+    assert float(period) == pytest.approx(3500.0, abs=3.0)
+    assert "multiplier 1" in done.out
+    assert done.out.splitlines()[-1] == "cycle.png"
+    assert Path("cycle.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_json_holds_the_numbers_and_nothing_else(annelid: Command) -> None:
+    done = annelid(
+        "study", "limit-cycle", "--json", "--time", "located", "--neuron", "contraction_2", "--threshold", "12"
+    )
+    read = json.loads(done.out)
+    assert (read["name"], read["n_segments"]) == ("riddle2022-planar", 3)
+    assert read["located"]["period_s"] == pytest.approx(2.625, abs=0.003)
+    response = read["located"]["phase_response_s"]
+    assert len(response) == len(read["located"]["phase_s"])
+    assert len(response[0]) == len(read["located"]["states"]) == 21
+
+
+@pytest.mark.slow
+def test_all_ways_are_taken_unless_one_is_named(annelid: Command) -> None:
+    read = json.loads(annelid("study", "limit-cycle", "--json").out)
+    for way in ("located", "stepped"):
+        assert read[way]["period_s"] == pytest.approx(2.625, abs=0.003)
+    real, imaginary = read["continuous"]["multipliers"][0]
+    assert (real, imaginary) == (pytest.approx(1.0, abs=0.01), 0.0)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (("riddle2023-rods",), "choose a planar body"),
+        (("--set", "sensor.noise_m=0.001"), "set sensor.noise_m=0"),
+        (("--neuron", "contractoin_1"), "did you mean 'contraction_1'"),
+        (("--time", "continuos"), "did you mean 'continuous'"),
+        (("-o", "cycle.txt"), "must end in .png, .pdf, .svg"),
+        (("--segments", "2"), "at least 3"),
+    ],
+)
+def test_bad_input_ends_in_one_sentence(annelid: Command, arguments: tuple[str, ...], says: str) -> None:
+    done = annelid("study", "limit-cycle", *arguments)
+    assert done.exit_code == 2
+    assert says in done.sentence()
+    assert not list(Path().iterdir())
+
+
+def test_a_picture_is_kept_unless_forced(annelid: Command) -> None:
+    Path("cycle.png").write_text("mine")
+    assert "cycle.png exists" in annelid("study", "limit-cycle", "-o", "cycle.png").sentence()
+    assert Path("cycle.png").read_text() == "mine"

@@ -1,0 +1,190 @@
+"""Phase oscillators: the published drive response, locked chains in closed form, and the change of gait."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from annelid.errors import ConfigError
+from annelid_studies.oscillators import DriveResponse, PhaseNetwork, PhaseState, PhaseStepper, phase_chain, steady_lags
+from annelid_studies.oscillators.phase_chain import BODY, LIMB
+
+
+def settle(network: PhaseNetwork, drive: float, seconds: float = 20.0, dt: float = 1e-2, seed: int = 0) -> PhaseState:
+    stepper = PhaseStepper(network, dt)
+    phase = np.random.default_rng(seed).uniform(-0.5, 0.5, (1, len(network.responses)))
+    state = stepper.initial_state(drive, phase)
+    for _ in range(round(seconds / dt)):
+        state = stepper.advance(state, drive)
+    return state
+
+
+def frequencies(network: PhaseNetwork, state: PhaseState, drive: float, seconds: float = 10.0) -> np.ndarray:
+    """Mean frequency of every oscillator from a state on, Hz."""
+    stepper = PhaseStepper(network, 1e-2)
+    before = state.phase_rad
+    for _ in range(round(seconds / 1e-2)):
+        state = stepper.advance(state, drive)
+    return (state.phase_rad - before)[0] / (2 * np.pi * seconds)
+
+
+def wrapped(phase: np.ndarray) -> np.ndarray:
+    return np.angle(np.exp(1j * phase))
+
+
+@pytest.mark.parametrize(
+    ("response", "drive", "frequency", "amplitude"),
+    [
+        (BODY, 0.999, 0.0, 0.0),
+        (BODY, 1.0, 0.5, 0.261),
+        (BODY, 3.0, 0.9, 0.391),
+        (BODY, 5.0, 1.3, 0.521),
+        (BODY, 5.001, 0.0, 0.0),
+        (LIMB, 0.999, 0.0, 0.0),
+        (LIMB, 1.0, 0.2, 0.262),
+        (LIMB, 3.0, 0.6, 0.524),
+        (LIMB, 3.001, 0.0, 0.0),
+    ],
+)
+def test_frequency_and_amplitude_follow_the_drive_and_saturate_as_published(
+    response: DriveResponse, drive: float, frequency: float, amplitude: float
+) -> None:
+    """Limbs are slower than the body at any drive, and fall silent first (Ijspeert et al. 2007)."""
+    assert float(response.frequency_Hz(drive)) == pytest.approx(frequency)
+    assert float(response.amplitude(drive)) == pytest.approx(amplitude)
+
+
+def chain_of(frequency_Hz: np.ndarray, amplitude: float, coupling: float, lag: float) -> PhaseNetwork:
+    """A chain whose oscillators each have a frequency of their own at any drive."""
+    n = len(frequency_Hz)
+    plain = phase_chain(n, lag, coupling)
+    responses = tuple(DriveResponse(-1e9, 1e9, 0.0, float(nu), 0.0, amplitude) for nu in frequency_Hz)
+    return PhaseNetwork(responses, plain.coupling_per_s, plain.phase_bias_rad)
+
+
+@settings(max_examples=15)
+@pytest.mark.slow
+@given(
+    frequency=st.lists(st.floats(0.8, 1.2), min_size=2, max_size=5),
+    amplitude=st.floats(0.5, 1.0),
+    lag=st.floats(-1.0, 1.0),
+)
+def test_a_locked_chain_has_the_mean_frequency_and_the_lags_of_the_closed_form(
+    frequency: list[float], amplitude: float, lag: float
+) -> None:
+    nu = np.array(frequency)
+    network = chain_of(nu, amplitude, 12.0, lag)
+    expected = steady_lags(nu, amplitude, 12.0, lag)
+    assert np.isfinite(expected).all()
+    state = settle(network, 0.0)
+    np.testing.assert_allclose(wrapped(-np.diff(state.phase_rad[0])), expected, atol=1e-6)
+    np.testing.assert_allclose(frequencies(network, state, 0.0, 1.0), nu.mean(), atol=1e-6)
+
+
+def test_two_oscillators_lock_up_to_their_coupling_and_no_further() -> None:
+    coupling, amplitude = 4.0, 0.8
+    edge = coupling * amplitude / np.pi
+    for share in (0.99, 1.01):
+        nu = np.array([1.0 + share * edge, 1.0])
+        network = chain_of(nu, amplitude, coupling, 0.3)
+        state = settle(network, 0.0, 40.0)
+        apart = -np.diff(frequencies(network, state, 0.0, 40.0))[0]
+        lags = steady_lags(nu, amplitude, coupling, 0.3)
+        if share < 1:
+            assert lags[0] == pytest.approx(0.3 + np.arcsin(share))
+            assert abs(apart) < 1e-6
+        else:
+            assert np.isnan(lags[0])
+            # The mean beat of an overdamped pendulum.
+            assert apart == pytest.approx(edge * np.sqrt(share**2 - 1), rel=0.1)
+
+
+@pytest.mark.parametrize("n", [3, 6, 8])
+def test_swimming_is_one_travelling_wave_at_the_intrinsic_frequency(n: int) -> None:
+    network, drive = phase_chain(n), 4.0
+    # The slowest of its modes dies at 2 w R (1 - cos(pi / n)): 0.7/s for eight.
+    state = settle(network, drive, 40.0)
+    np.testing.assert_allclose(wrapped(-np.diff(state.phase_rad[0])), 2 * np.pi / n, atol=1e-6)
+    np.testing.assert_allclose(frequencies(network, state, drive), 1.1, atol=1e-6)
+    np.testing.assert_allclose(state.amplitude, 0.456, atol=1e-9)
+
+
+def test_drive_takes_the_salamander_from_rest_to_walking_to_swimming_to_rest() -> None:
+    network = phase_chain(8, limbs=True)
+    body, limbs = slice(0, 8), slice(8, 10)
+    walking = {}
+    for drive in (0.5, 2.0, 2.9, 3.1, 4.0, 5.5):
+        state = settle(network, drive)
+        frequency = frequencies(network, state, drive)
+        lags = wrapped(-np.diff(state.phase_rad[0, body]))
+        if drive < 1 or drive > 5:
+            np.testing.assert_allclose(state.amplitude, 0, atol=1e-9)
+            np.testing.assert_allclose(frequency, 0, atol=1e-9)
+        elif drive < 3:
+            # Walking: the whole body at the limbs' own frequency, and lags small but for the jump between girdles.
+            np.testing.assert_allclose(frequency, 0.2 * drive, atol=1e-6)
+            assert np.abs(np.delete(lags, 3)).max() < 0.5 * 2 * np.pi / 8
+            assert abs(lags[3]) > 0.6 * np.pi
+            walking[drive] = frequency.mean()
+        else:
+            # Swimming: silent limbs, a travelling wave, faster than any walk.
+            np.testing.assert_allclose(state.amplitude[0, limbs], 0, atol=1e-9)
+            np.testing.assert_allclose(lags, 2 * np.pi / 8, atol=1e-5)
+            np.testing.assert_allclose(frequency[body], 0.2 * drive + 0.3, atol=1e-6)
+            assert frequency[body].min() > max(walking.values()) + 0.3
+
+
+def test_amplitude_settles_by_its_critically_damped_closed_form() -> None:
+    """r - R falls as (1 + a t / 2) exp(-a t / 2) after a step of the drive."""
+    stepper = PhaseStepper(phase_chain(3), 1e-3)
+    state = stepper.initial_state(1.0)
+    before, after = 0.261, 0.521
+    for step in range(1, 401):
+        state = stepper.advance(state, 5.0)
+        s = 10.0 * step * 1e-3
+        expected = after + (before - after) * (1 + s) * np.exp(-s)
+        np.testing.assert_allclose(state.amplitude, expected, atol=2e-5)
+
+
+def test_the_antiphase_side_of_the_salamander_adds_nothing() -> None:
+    """Two chains coupled at pi, started in antiphase, are each the chain alone: the reason for keeping one side."""
+    one = phase_chain(4)
+    n = 4
+    weight, bias = np.zeros((2 * n, 2 * n)), np.zeros((2 * n, 2 * n))
+    for side in (slice(0, n), slice(n, 2 * n)):
+        weight[side, side], bias[side, side] = one.coupling_per_s, one.phase_bias_rad
+    left, right = np.arange(n), np.arange(n) + n
+    weight[left, right] = weight[right, left] = 10.0
+    bias[left, right] = bias[right, left] = np.pi
+    both = PhaseNetwork(one.responses * 2, weight, bias)
+    phase = np.array([0.3, -0.4, 0.1, 0.9])
+    a, b = PhaseStepper(one, 5e-3), PhaseStepper(both, 5e-3)
+    alone, paired = a.initial_state(3.5, phase), b.initial_state(3.5, np.append(phase, phase + np.pi))
+    for _ in range(400):
+        alone, paired = a.advance(alone, 3.5), b.advance(paired, 3.5)
+    np.testing.assert_allclose(paired.phase_rad[0, :n], alone.phase_rad[0], atol=1e-9)
+
+
+def test_copies_in_a_batch_have_drives_of_their_own() -> None:
+    stepper = PhaseStepper(phase_chain(3, limbs=True), 5e-3)
+    drives = np.array([0.5, 2.0, 4.0])
+    phase = np.random.default_rng(0).uniform(-3, 3, (3, 5))
+    batch = stepper.initial_state(drives, phase)
+    alone = [stepper.initial_state(d, phase[[k]]) for k, d in enumerate(drives)]
+    for _ in range(200):
+        batch = stepper.advance(batch, drives)
+        alone = [stepper.advance(state, d) for state, d in zip(alone, drives, strict=True)]
+    for k, state in enumerate(alone):
+        np.testing.assert_allclose(batch.phase_rad[k], state.phase_rad[0], rtol=1e-12)
+        np.testing.assert_allclose(stepper.output(batch)[k], stepper.output(state)[0], rtol=1e-12)
+
+
+def test_what_is_no_network_is_refused() -> None:
+    with pytest.raises(ConfigError, match="n_body must be at least 2, not 1"):
+        phase_chain(1)
+    with pytest.raises(ConfigError, match=r"coupling_per_s has shape \(3, 3\), but 2 oscillators need \(2, 2\)"):
+        PhaseNetwork((BODY, BODY), np.zeros((3, 3)), np.zeros((2, 2)))
+    with pytest.raises(ConfigError, match=r"time step of 0\.06 s is too long"):
+        PhaseStepper(phase_chain(3), 0.06)

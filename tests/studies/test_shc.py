@@ -1,0 +1,184 @@
+"""The heteroclinic ring: rates at its saddles, order, and dwell times against their closed forms."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from annelid.errors import ConfigError
+from annelid_studies.oscillators import (
+    HeteroclinicRing,
+    HeteroclinicStepper,
+    bias_dwell_s,
+    handover_input,
+    largest_gain_per_s,
+    noise_dwell_s,
+)
+
+rings = st.builds(HeteroclinicRing, st.integers(3, 8), st.floats(1.0, 50.0), st.floats(1.1, 5.0))
+
+
+def jacobian(ring: HeteroclinicRing, node: int) -> np.ndarray:
+    """Of ``x_i (alpha - (rho x)_i)`` at a node, by central differences."""
+    rho = ring.competition()
+
+    def flow(x: np.ndarray) -> np.ndarray:
+        return x * (ring.growth_rate_per_s - rho @ x)
+
+    at, small = np.eye(ring.n_nodes)[node], 1e-6
+    steps = small * np.eye(ring.n_nodes)
+    return np.stack([(flow(at + step) - flow(at - step)) / (2 * small) for step in steps], axis=1)
+
+
+@given(ring=rings)
+def test_every_node_is_a_saddle_left_towards_its_successor_only(ring: HeteroclinicRing) -> None:
+    for node in range(ring.n_nodes):
+        at = np.eye(ring.n_nodes)[node]
+        np.testing.assert_allclose(at * (ring.growth_rate_per_s - ring.competition() @ at), 0, atol=1e-12)
+        complex_values, complex_vectors = np.linalg.eig(jacobian(ring, node))
+        values, vectors = np.real(complex_values), np.real(complex_vectors)
+        order = np.argsort(values)
+        np.testing.assert_allclose(values[order[:-1]], -ring.growth_rate_per_s, rtol=1e-5)
+        assert values[order[-1]] == pytest.approx(ring.growth_rate_per_s / ring.saddle_value, rel=1e-5)
+        leaving = vectors[:, order[-1]]
+        others = np.delete(leaving, [node, (node + 1) % ring.n_nodes])
+        assert abs(leaving[(node + 1) % ring.n_nodes]) > 1e-3
+        np.testing.assert_allclose(others, 0, atol=1e-5)
+
+
+def visits(
+    ring: HeteroclinicRing, seconds: float, noise: float, bias: float | np.ndarray, copies: int = 1, dt: float = 1e-3
+) -> np.ndarray:
+    """The node of largest activity over time, ``(n_steps, copies)``."""
+    rng = np.random.default_rng(1)
+    stepper = HeteroclinicStepper(ring, dt)
+    state = stepper.initial_state(copies)
+    largest = []
+    for _ in range(round(seconds / dt)):
+        kick = noise * rng.standard_normal(state.shape) if noise else 0.0
+        state = stepper.advance(state, bias, kick)
+        assert (state >= 0).all()
+        largest.append(state.argmax(axis=1))
+    return np.array(largest)
+
+
+def dwells(largest: np.ndarray, dt: float = 1e-3) -> np.ndarray:
+    """Times from one change of node to the next, s, without the first two of each copy."""
+    pooled = []
+    for of_copy in largest.T:
+        changes = np.flatnonzero(np.diff(of_copy))
+        pooled.extend(np.diff(changes)[1:] * dt)
+    return np.array(pooled)
+
+
+@pytest.mark.parametrize(("noise", "bias"), [(1e-4, 0.0), (0.0, 1e-4), (1e-3, 1e-3)])
+@pytest.mark.parametrize("n", [3, 6])
+def test_nodes_are_visited_in_order(n: int, noise: float, bias: float) -> None:
+    largest = visits(HeteroclinicRing(n), 12.0, noise, bias, copies=5)
+    for of_copy in largest.T:
+        order = of_copy[np.flatnonzero(np.diff(of_copy, prepend=-1))]
+        assert len(order) > n
+        np.testing.assert_array_equal(order, np.arange(len(order)) % n)
+
+
+@pytest.mark.parametrize("saddle_value", [1.5, 2.0, 4.0])
+def test_dwell_grows_with_the_logarithm_of_a_small_bias_over_the_leaving_rate(saddle_value: float) -> None:
+    ring = HeteroclinicRing(3, 20.0, saddle_value)
+    biases = np.array([1e-4, 1e-6, 1e-8])
+    # Copies side by side, each with its own bias.
+    largest = visits(ring, 40.0, 0.0, biases[:, np.newaxis], copies=3)
+    mean = np.array([dwells(largest[:, [k]]).mean() for k in range(3)])
+    np.testing.assert_allclose(np.diff(mean), np.diff(bias_dwell_s(ring, biases)), rtol=0.01)
+
+
+def test_mean_and_spread_of_the_dwell_under_noise_are_stone_and_holmes_s() -> None:
+    ring = HeteroclinicRing(3, 20.0, 2.0)
+    noises = np.array([1e-3, 1e-5, 1e-7])
+    measured = [dwells(visits(ring, 20.0, noise, 0.0, copies=300)) for noise in noises]
+    mean = np.array([one.mean() for one in measured])
+    error = np.array([one.std() / np.sqrt(len(one)) for one in measured])
+    # Four standard errors of a difference of two means.
+    slack = 4 * np.hypot(error[1:], error[:-1])
+    assert (np.abs(np.diff(mean) - np.diff(noise_dwell_s(ring, noises))) < slack).all()
+    assert slack.max() < 0.05 * np.diff(mean).min()
+    for one in measured[1:]:
+        assert one.std() == pytest.approx(np.pi / np.sqrt(8) / ring.leaving_rate_per_s, rel=0.1)
+
+
+def test_the_time_to_leave_a_linear_saddle_is_the_closed_form() -> None:
+    """Decay, then growth, of one reflected variable: no ring, so nothing is left out."""
+    ring, noise, distance, dt = HeteroclinicRing(3, 20.0, 2.0), 1e-6, 1e-3, 1e-3
+    rng = np.random.default_rng(2)
+    settled = noise * rng.standard_normal(20_000) / np.sqrt(2 * ring.growth_rate_per_s)
+    x, left = settled, np.full(20_000, np.nan)
+    for step in range(2000):
+        x = np.abs(x * np.exp(ring.leaving_rate_per_s * dt) + noise * np.sqrt(dt) * rng.standard_normal(x.shape))
+        left = np.where(np.isnan(left) & (x >= distance), (step + 1) * dt, left)
+    assert not np.isnan(left).any()
+    assert left.mean() == pytest.approx(float(noise_dwell_s(ring, noise, distance)), abs=3e-3)
+
+
+def test_feedback_ends_the_dwell() -> None:
+    ring = HeteroclinicRing(4)
+    stepper = HeteroclinicStepper(ring, 1e-3)
+    lasts = []
+    for cue_from in (200, 500, 900):
+        state, step = stepper.initial_state(), 0
+        while state.argmax() == 0 and step < 5000:
+            state = stepper.advance(state, handover_input(state, float(step >= cue_from), 0.1))
+            step += 1
+        lasts.append(step - cue_from)
+    # Without noise or bias the ring waits for its cue, however long, and then always takes the same time.
+    assert lasts[0] == lasts[1] == lasts[2]
+    grown = np.log(0.5 * ring.leaving_rate_per_s / 0.1) / ring.leaving_rate_per_s
+    assert lasts[0] * 1e-3 == pytest.approx(grown, rel=0.35)
+
+
+def test_handover_excites_the_successor_of_the_active_node_alone() -> None:
+    state = np.array([[0.0, 0.0, 1.0], [0.2, 0.5, 0.0]])
+    np.testing.assert_allclose(handover_input(state, np.array([1.0, 0.0, 1.0]), 3.0), [[3.0, 0, 0], [0, 0.6, 0]])
+
+
+@pytest.mark.parametrize(("n", "saddle_value"), [(3, 2.0), (3, 1.2), (4, 2.0), (5, 3.0)])
+def test_with_every_cue_on_the_ring_rests_between_its_nodes_from_the_closed_form_s_gain_on(
+    n: int, saddle_value: float
+) -> None:
+    ring = HeteroclinicRing(n, 20.0, saddle_value)
+    # A step adds dt |Im lambda|^2 / 2 to a growth rate: at 1 ms as much as the margins here.
+    stepper = HeteroclinicStepper(ring, 2e-4)
+    for share, rests in ((0.9, False), (1.1, True)):
+        gain = share * largest_gain_per_s(ring)
+        middle = (20.0 + gain) / ring.competition()[0].sum()
+        state = middle * (1 + 1e-3 * np.cos(2 * np.pi * np.arange(n) / n))[np.newaxis]
+        before = np.ptp(state)
+        for _ in range(15_000):
+            state = stepper.advance(state, handover_input(state, 1.0, gain))
+        assert (np.ptp(state) < before) == rests
+
+
+def test_copies_in_a_batch_are_those_alone() -> None:
+    ring = HeteroclinicRing(5)
+    stepper = HeteroclinicStepper(ring, 2e-3)
+    rng = np.random.default_rng(3)
+    batch = rng.random((4, 5))
+    alone = [row[np.newaxis] for row in batch]
+    for _ in range(50):
+        kick = 0.1 * rng.standard_normal((4, 5))
+        batch = stepper.advance(batch, 0.01, kick)
+        alone = [stepper.advance(row, 0.01, kick[[k]]) for k, row in enumerate(alone)]
+    np.testing.assert_allclose(batch, np.concatenate(alone), rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [((2,), "n_nodes must be at least 3"), ((3, 0.0), "growth_rate_per_s"), ((3, 1.0, 1.0), "saddle_value")],
+)
+def test_a_ring_that_is_none_is_refused(arguments: tuple[Any, ...], sentence: str) -> None:
+    with pytest.raises(ConfigError, match=sentence):
+        HeteroclinicRing(*arguments)
+    with pytest.raises(ConfigError, match=r"time step of 0\.05 s does not fit growth_rate_per_s = 20"):
+        HeteroclinicStepper(HeteroclinicRing(3), 0.05)

@@ -24,9 +24,9 @@ from annelid.output import write_csv
 from annelid_lab.calibration.kinds.load_frame import FrameTest
 from annelid_lab.calibration.kinds.ring_down import RingDown
 from annelid_lab.calibration.kinds.tensile import Tensile
+from annelid_lab.calibration.load_frame import Loop, cable_force
 from annelid_lab.calibration.report import identify
 from annelid_lab.calibration.study import load_identify_study
-from annelid_lab.load_frame import Loop, cable_force
 
 ROBOTS = 50
 REACH_M = 0.24

@@ -48,8 +48,8 @@ from annelid.body.formulations.chain.capsules import SOLVER_ITERATIONS, add_chai
 from annelid.body.formulations.rods import Rods
 from annelid.body.formulations.rods.net import add_rod, add_vertex, lumped_masses
 from annelid.body.formulations.rods.strains import RodStrains, vertex_stiffness
+from annelid.body.mesh import Strands
 from annelid.body.rows import add_row, tendons_to_rows
-from annelid.body.worm import Strands
 from annelid.config import load_config
 from annelid.morphology import Array, helical_mesh
 from annelid.output import write_csv
@@ -202,8 +202,9 @@ def annelid(scene: Scene, *, exact: bool = False) -> tuple[Step, float]:
         add_vertex(spec, names[place[0]][place[1]], scene.vertices_m[place], float(masses[place]))
     edges_m = np.linalg.norm(np.diff(scene.vertices_m, axis=1), axis=-1)
     stiffness_Nm = vertex_stiffness(edges_m, strands, np.ones((2, n_strands, n_vertices - 2)))
+    edge_s = rods.edge_time_constant_s
     for s, vertices_m in enumerate(scene.vertices_m):
-        add_rod(spec, f"strand_{s}", vertices_m, names[s], strands, rods, stiffness_Nm=stiffness_Nm[:, s])
+        add_rod(spec, f"strand_{s}", vertices_m, names[s], strands, edge_s, stiffness_Nm=stiffness_Nm[:, s])
         if scene.clamped:
             spec.joint(f"strand_{s}_twist_0").armature = CLAMP_KG
     tendons_to_rows(spec)
@@ -244,7 +245,9 @@ def chain(scene: Scene, *, published: bool) -> tuple[Step, float]:
     n_elements = scene.vertices_m.shape[1] - 1
     root = 0 if scene.clamped else n_elements // 2
     for s, vertices_m in enumerate(scene.vertices_m):
-        add_chain(spec, f"strand_{s}", vertices_m, scene.strands, settings, root=root, fixed_root=scene.clamped)
+        add_chain(
+            spec, f"strand_{s}", vertices_m, scene.strands, settings.armature_kg_m2, root=root, fixed_root=scene.clamped
+        )
 
     def attached(place: Place) -> tuple[str, Array]:
         """An element that ends at a vertex, and the vertex in the axes of that element."""

@@ -149,10 +149,13 @@ def modules_of(package: Path) -> dict[str, Path]:
 
 
 def test_no_circle_of_imports() -> None:
-    modules = modules_of(SOURCE) | modules_of(LAB) | modules_of(STUDIES)
+    """Wherever the statement stands: at the top, in a function, or for type checkers only."""
+    packages = [path.parent for path in SOURCE.parent.glob("*/__init__.py")]
+    modules = {name: path for package in packages for name, path in modules_of(package).items()}
+    assert {"annelid.body.worm", "annelid_studies.riddle2023.paper"} <= modules.keys()
     needed: dict[str, set[str]] = {name: set() for name in modules}
     for name, path in modules.items():
-        for node in executed(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Import):
                 needed[name] |= {alias.name for alias in node.names}
             elif isinstance(node, ast.ImportFrom):

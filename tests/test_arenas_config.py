@@ -10,8 +10,8 @@ import pytest
 from annelid.arena.kinds.floor import Floor
 from annelid.arena.kinds.pipe import Pipe
 from annelid.config import RunConfig, arena_names, arena_summary, arena_text, load_config
-from annelid.config.arena import SHARED
 from annelid.config.checking import whole_path
+from annelid.config.run import SHARED
 from annelid.errors import ConfigError
 
 OPTIONAL = {"rail_gap_m", "posts"}

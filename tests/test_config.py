@@ -274,13 +274,6 @@ def test_unreadable_files_are_refused_in_one_sentence(tmp_path: Path) -> None:
         load_config(broken)
 
 
-def test_an_unknown_name_of_the_configuration_is_no_attribute() -> None:
-    import annelid.config
-
-    with pytest.raises(AttributeError, match="no attribute 'Nothing'"):
-        _ = annelid.config.Nothing
-
-
 def test_names_that_have_moved_are_found_with_a_warning() -> None:
     import annelid.export
     import annelid.nervous

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from annelid.body.worm import Mesh
+from annelid.body.mesh import Mesh
 from annelid.morphology import MeshGeometry, helical_mesh
 
 

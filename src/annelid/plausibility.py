@@ -9,14 +9,11 @@ from collections.abc import Iterator
 from dataclasses import replace
 from math import cos, degrees, hypot, log, pi, radians, sqrt, tan
 from statistics import fmean
-from typing import TYPE_CHECKING
 
 from annelid.body.estimates import Finding, rhombus_of, softened
 from annelid.body.worm import WormBody
+from annelid.config.run import RunConfig
 from annelid.errors import ConfigError, listed
-
-if TYPE_CHECKING:
-    from annelid.config.run import RunConfig
 
 __all__ = ["check", "refuse_nonsense", "tolerance_window_m"]
 

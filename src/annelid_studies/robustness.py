@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.stats import binomtest
 
 from annelid.analysis import DESIGN_INTERVAL_S, RhythmScore, lengthening_score, rhythm_score
 from annelid.errors import ConfigError, RunFileError, suggest
@@ -236,8 +237,6 @@ def shares(judged: Sequence[Judged]) -> dict[str, dict[str, Any]]:
         For every controller the number of points, of those walked, in time, and in time with their segments lengthening
         in the same order, and the share in time with its 95 % interval after Wilson 1927.
     """
-    from scipy.stats import binomtest
-
     found: dict[str, dict[str, Any]] = {}
     for controller, own in grouped(judged, lambda one: one.controller).items():
         n, good = len(own), sum(one.in_time for one in own)

@@ -13,7 +13,7 @@ from annelid.analysis.passage import Passage, passage_through
 from annelid.analysis.track import Track
 from annelid.arena.kinds.pipe import Pipe
 from annelid.body import mesh_of
-from annelid.body.worm import Mesh
+from annelid.body.mesh import Mesh
 
 GEOMETRY = mesh_of(Mesh(n_segments=6, planes_between_rings=3, free_planes_at_ends=2))
 SPACING_M, RADIUS_M = 0.11, 0.12

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 from annelid.analysis.track import Track, track_of, turn_of
 from annelid.body import mesh_of
-from annelid.body.worm import Mesh, WormBody
+from annelid.body.mesh import Mesh
+from annelid.body.worm import WormBody
 from annelid.config import load_config
 from annelid.errors import RunFileError
 from annelid.simulation import simulate

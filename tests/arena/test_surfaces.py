@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from annelid.arena.ground import surface_of
 from annelid.arena.kinds.floor import Floor
 from annelid.arena.kinds.pipe import Pipe, PipeWall
 from annelid.arena.kinds.relief import Rough, Steps
-from annelid.arena.surface import surface_of
 from annelid.config import ArenaKind
 from annelid.protocols import Array
 
@@ -221,7 +221,7 @@ def test_to_first_order_a_distance_is_as_near_as_stated() -> None:
 
 
 def test_a_slope_leans_gravity_and_leaves_the_ground_level() -> None:
-    from annelid.arena.surface import gravity_of
+    from annelid.arena.ground import gravity_of
 
     slope = Floor(slope_deg=10.0)
     pull = gravity_of(slope)

@@ -17,7 +17,7 @@ from annelid.body import mesh_of
 from annelid.body.actuation import stretch_sensors
 from annelid.body.actuators.muscle import Rings
 from annelid.body.actuators.servo import ServoRings
-from annelid.body.worm import Mesh, Springs
+from annelid.body.mesh import Mesh, Springs
 from annelid.config import load_config
 from annelid.errors import ConfigError
 from annelid.simulation.worm import WormPlant

@@ -8,13 +8,12 @@ import mujoco
 import numpy as np
 import pytest
 
-from annelid.body.formulations.chain import Chain
 from annelid.body.formulations.chain.capsules import add_chain
 from annelid.body.formulations.rods import Rods
 from annelid.body.formulations.rods.net import add_rod, add_vertex, lumped_masses
 from annelid.body.formulations.rods.strains import RodStrains, vertex_stiffness
+from annelid.body.mesh import Strands
 from annelid.body.rows import tendons_to_rows
-from annelid.body.worm import Strands
 from annelid.simulation.two_step import TwoStep
 
 LENGTH_M = 0.6
@@ -52,7 +51,7 @@ class RodCantilever:
             add_vertex(spec, body, place, mass)
         shares = np.ones((2, ELEMENTS - 1)) if shares is None else shares
         stiffness = vertex_stiffness(np.full(ELEMENTS, ELEMENT_M), STRANDS, shares)
-        add_rod(spec, "strand_0", VERTICES, bodies, STRANDS, Rods(), stiffness_Nm=stiffness)
+        add_rod(spec, "strand_0", VERTICES, bodies, STRANDS, Rods().edge_time_constant_s, stiffness_Nm=stiffness)
         spec.joint("strand_0_twist_0").armature = CLAMP_KG
         tendons_to_rows(spec)
         self.model = spec.compile()
@@ -71,7 +70,7 @@ def chain_cantilever(shares: np.ndarray | None = None) -> mujoco.MjModel:
     spec = mujoco.MjSpec()
     spec.option.gravity = [0, 0, 0]
     spec.option.timestep = 0.005
-    add_chain(spec, "rod", VERTICES, STRANDS, Chain(armature_kg_m2=1e-5), root=0, fixed_root=True, shares=shares)
+    add_chain(spec, "rod", VERTICES, STRANDS, 1e-5, root=0, fixed_root=True, shares=shares)
     return spec.compile()
 
 

@@ -12,7 +12,8 @@ import pytest
 from annelid.body import assemble, build_spec, compile_spec, mesh_of
 from annelid.body.assemble import mjcf_text
 from annelid.body.formulations.rods.strains import net_stiffness
-from annelid.body.worm import Strands, WormBody
+from annelid.body.mesh import Strands
+from annelid.body.worm import WormBody
 from annelid.config import RunConfig, load_config
 from annelid.errors import ConfigError
 from annelid.morphology import MeshGeometry, helical_mesh

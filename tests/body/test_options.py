@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from annelid.body import build_spec, mesh_of
-from annelid.body.worm import Mesh
+from annelid.body.mesh import Mesh
 from annelid.config import load_config
 from annelid.morphology import helical_mesh
 

@@ -23,13 +23,12 @@ from numpy.typing import NDArray
 from scipy.linalg import eig
 
 from annelid.body.formulations import BDF2_SHARE
-from annelid.body.formulations.chain import Chain
 from annelid.body.formulations.chain.capsules import add_chain
 from annelid.body.formulations.rods import Rods
 from annelid.body.formulations.rods.net import add_rod, add_vertex, lumped_masses
 from annelid.body.formulations.rods.strains import RodStrains, vertex_stiffness
+from annelid.body.mesh import Strands
 from annelid.body.rows import HELD, tendons_to_rows
-from annelid.body.worm import Strands
 from annelid.morphology import Array
 from annelid.simulation import worm as _engine_warnings_go_to_the_log  # noqa: F401
 from annelid.simulation.two_step import TwoStep
@@ -163,7 +162,15 @@ def rod(case: Case, elements: int, strands: Strands, step_s: float) -> mujoco.Mj
     bodies = [f"v{index}" for index in range(elements + 2)]
     for body, vertex, mass in zip(bodies, vertices, masses, strict=True):
         add_vertex(spec, body, vertex, mass)
-    add_rod(spec, "strand_0", vertices, bodies, strands, Rods(), stiffness_Nm=stiffness_of(vertices, strands))
+    add_rod(
+        spec,
+        "strand_0",
+        vertices,
+        bodies,
+        strands,
+        Rods().edge_time_constant_s,
+        stiffness_Nm=stiffness_of(vertices, strands),
+    )
     spec.joint("strand_0_twist_0").armature = CLAMP_KG
     tendons_to_rows(spec)
     return spec
@@ -173,8 +180,7 @@ def chain(case: Case, elements: int, strands: Strands, step_s: float) -> mujoco.
     spec = mujoco.MjSpec()
     spec.option.timestep = step_s
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_EULER
-    formulation = Chain(armature_kg_m2=0.0)
-    add_chain(spec, "rod", case.vertices(elements), strands, formulation, root=0, fixed_root=True)
+    add_chain(spec, "rod", case.vertices(elements), strands, 0.0, root=0, fixed_root=True)
     return spec
 
 

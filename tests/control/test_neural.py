@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from annelid.config.run import StretchSensor as SensorSection
+from annelid.config.settings import StretchSensor as SensorSection
 from annelid.control import AdaptiveController, SnsController
 from annelid.control.base import design_of
 from annelid.control.pressure import PressureController, PressureSns

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from annelid.config.run import StretchSensor as SensorSection
+from annelid.config.settings import StretchSensor as SensorSection
 from annelid.control import CopySettings, SnsController
 from annelid.control.sns import Sns
 from annelid.errors import ConfigError

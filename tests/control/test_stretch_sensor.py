@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from annelid.config.run import StretchSensor as SensorSection
+from annelid.config.settings import StretchSensor as SensorSection
 from annelid.control import StretchSensor
 from annelid.control.stretch_sensor import lengthening_m
 from annelid.errors import ConfigError

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from annelid.config import check_config, load_config
-from annelid.config.run import StretchSensor as SensorSection
+from annelid.config.settings import StretchSensor as SensorSection
 from annelid.control import SnsController, TimedController
 from annelid.control.open_loop import TimedWave
 from annelid.control.sns import Sns

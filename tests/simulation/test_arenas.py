@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from annelid.arena.surface import surface_of
+from annelid.arena.ground import surface_of
 from annelid.config import RunConfig, load_config
 from annelid.errors import ConfigError
 from annelid.protocols import Array, Sensation

@@ -58,15 +58,15 @@ def test_the_report_is_markdown_with_every_finding(monkeypatch: pytest.MonkeyPat
 def test_the_commit_of_a_checkout_is_told_and_nothing_of_an_installed_package(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    source = tmp_path / "src" / "annelid"
+    source = tmp_path / "src" / "annelid" / "draw"
     source.mkdir(parents=True)
-    (source / "__init__.py").write_text("")
-    monkeypatch.setattr(module.annelid, "__file__", str(source / "__init__.py"))
+    (source / "doctor.py").write_text("")
+    monkeypatch.setattr(module, "__file__", str(source / "doctor.py"))
     assert "commit" not in bug_report([])
     git = ["git", "-C", str(tmp_path), "-c", "user.name=a", "-c", "user.email=a@b"]
     for command in (["init", "-q"], ["add", "."], ["commit", "-qm", "first"]):
         subprocess.run([*git, *command], check=True, timeout=120)
     head = subprocess.run([*git, "rev-parse", "HEAD"], capture_output=True, text=True, check=True, timeout=120).stdout
     assert f"(commit {head[:12]})" in bug_report([])
-    (source / "__init__.py").write_text("1")
+    (source / "doctor.py").write_text("1")
     assert f"(commit {head[:12]}, modified)" in bug_report([])

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from annelid.analysis.track import Track, track_of
-from annelid.config.arena import ArenaKind
+from annelid.config.run import ArenaKind
 from annelid.errors import RunFileError
 from annelid.protocols import Array
 from annelid.simulation.runfile import Run

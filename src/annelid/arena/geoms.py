@@ -16,7 +16,7 @@ import mujoco
 import numpy as np
 
 from annelid.arena.surface import Shape
-from annelid.config.arena import ArenaKind, Walls
+from annelid.config.run import ArenaKind, Walls
 from annelid.errors import ConfigError, shortened
 from annelid.morphology import Array, MeshGeometry
 

@@ -1,19 +1,17 @@
 """The surface that an arena offers to the skin, as numbers: how far points are from it, and where it faces.
 
-Also the triangles by which a surface without end is drawn, and the direction of gravity.
+Also the triangles by which a surface without end is drawn.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from math import cos, sin
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.config.arena import ArenaKind
 from annelid.protocols import Array
 
 SETTLED = 1e-10
@@ -158,25 +156,6 @@ class Implicit(Surface):
 def lengths(vectors: Array) -> Array:
     """Returns the lengths of vectors, ``(..., 3)``; several times as fast as `numpy.linalg.norm`."""
     return np.sqrt((vectors * vectors).sum(axis=-1))
-
-
-def surface_of(arena: ArenaKind) -> Surface:
-    """Returns the surface of an arena with its rails and posts, in the worm's model (its lowest line at z = 0)."""
-    gap_m, posts = arena.walls
-    side = np.array([0.0, 1.0, 0.0])
-    rails = () if gap_m is None else (Plane(side, -gap_m / 2), Plane(-side, -gap_m / 2))
-    walls = (*rails, *(Round(np.array([x, y]), radius) for x, y, radius in posts))
-    return Between((arena.ground(), *walls)) if walls else arena.ground()
-
-
-def gravity_of(arena: ArenaKind) -> Array:
-    """Returns the acceleration of gravity in the model's axes, m/s^2, ``(3,)``.
-
-    On a slope the axes lie in the ground, and gravity leans towards the rear of a worm that climbs.
-    """
-    slope = arena.slope_rad
-    # Level ground has no negative zeros to write into a model file.
-    return arena.gravity_m_per_s2 * np.array([sin(slope), 0.0, -cos(slope)])
 
 
 class Shape(NamedTuple):

@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from annelid.body.estimates import bearable_force_N, rhombus_of
     from annelid.body.formulations import FormulationKind
     from annelid.body.formulations.rods import Rods
-    from annelid.body.worm import Mesh, WormBody
+    from annelid.body.mesh import Mesh
+    from annelid.body.worm import WormBody
 
 # Every use of the engine begins here, and a mixed one fails with errors that explain nothing.
 refuse_mixed_engine()

@@ -13,7 +13,7 @@ import numpy as np
 
 from annelid.arena.geoms import HIDDEN_GROUP
 from annelid.body.actuators import ActuatorKind
-from annelid.body.worm import Joints, Springs
+from annelid.body.mesh import Joints, Springs
 from annelid.morphology import Indices, MeshGeometry
 
 SPRING_RGBA = (0.75, 0.15, 0.1, 1.0)

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from annelid.arena.geoms import add_moving_planes, add_scenery, add_walls
-from annelid.arena.surface import gravity_of
+from annelid.arena.ground import gravity_of
 from annelid.body.actuation import (
     add_joint_friction,
     add_length_sensor,
@@ -18,7 +18,8 @@ from annelid.body.actuation import (
     add_springs,
     stretch_sensors,
 )
-from annelid.body.worm import Mesh, WormBody
+from annelid.body.mesh import Mesh
+from annelid.body.worm import WormBody
 from annelid.config import RunConfig
 from annelid.errors import ConfigError
 from annelid.morphology import MeshGeometry, helical_mesh

@@ -19,13 +19,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from math import cos, hypot, tan
 from statistics import fmean
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
+from annelid.body.mesh import MeshBody
 from annelid.morphology import Rhombus, rhombus
-
-if TYPE_CHECKING:
-    from annelid.body.actuators import ActuatorKind
-    from annelid.body.worm import WormBody
 
 HARDLY = 0.02
 """Share of its length at rest below which a ring has hardly been shortened."""
@@ -66,18 +63,18 @@ def _text(value: object) -> str:
     return f"{value:g}" if isinstance(value, int | float) else str(value)
 
 
-def rhombus_of(body: WormBody) -> Rhombus:
+def rhombus_of(body: MeshBody) -> Rhombus:
     """Returns the rhombus at rest of a body whose segments have one radius."""
     mesh = body.mesh
     return rhombus(mesh.n_helices, mesh.one_number("radius_m"), mesh.angular_rate_rad_per_m, mesh.elements_per_side)
 
 
-def touching_ring_m(body: WormBody) -> float:
+def touching_ring_m(body: MeshBody) -> float:
     """Returns the length of a ring at which the strands of neighbouring crossings touch, m."""
     return body.mesh.n_helices // 2 * 2.0 * body.strands.radius_m
 
 
-def bearable_force_N(body: WormBody, share: float = 1 / 3) -> float:
+def bearable_force_N(body: MeshBody, share: float = 1 / 3) -> float:
     """Estimates the tension at which a ring closes to a share of the rhombi's opening at rest, N: see the module.
 
     Segments must be alike, as `WormBody.groups` makes them.
@@ -97,14 +94,7 @@ def bearable_force_N(body: WormBody, share: float = 1 / 3) -> float:
     return bending + springs.one_number("stiffness_N_per_m") * stretch * tan(opening)
 
 
-def strongest(rings: ActuatorKind, n_segments: int) -> Iterator[tuple[float, float, float]]:
-    """Returns every operating range of the rings, m, with the greatest force of an actuator that has it, N."""
-    spans, forces = rings.length_ranges(n_segments), rings.forces(n_segments)
-    for low, high in dict.fromkeys(spans):
-        yield low, high, max(force for own, force in zip(spans, forces, strict=True) if own == (low, high))
-
-
-def weak(body: WormBody, field: str, value: float, force_N: float) -> Iterator[Finding]:
+def weak(body: MeshBody, field: str, value: float, force_N: float) -> Iterator[Finding]:
     """Checks the greatest force of an actuator against what hardly closes a ring."""
     needed = bearable_force_N(body, 1.0 - HARDLY)
     if force_N < needed / UNSURE:

@@ -1,172 +1,34 @@
-"""The 3D worm's body: mesh, materials, springs, and any kind of ring actuators and formulation."""
+"""The 3D worm's body: a mesh with any kind of ring actuators and formulation."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from importlib import import_module
-from math import pi
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self, cast
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, model_validator
 
 from annelid.body.actuators import ActuatorKind
 from annelid.body.formulations import FormulationKind
-from annelid.config.kinds import BodyKind, Choice, default_of
-from annelid.config.sections import Length, Modulus, NonNegative, PerSegmentOf, Positive, Section
+from annelid.body.mesh import MeshBody
+from annelid.config.kinds import Choice, default_of
+from annelid.config.run import RunConfig
+from annelid.config.sections import Section
 from annelid.errors import ConfigError, shown
+from annelid.protocols import Plant
 
 if TYPE_CHECKING:
     from annelid.body.actuators.muscle import Rings
-    from annelid.config.run import RunConfig
-    from annelid.protocols import Plant
 
 EQUAL_STIFFNESS_RADIUS_M = 0.00299
 """Radius of a solid strand that bends as the robot's tube: the authors' choice of 2025."""
 ALIKE_IN_A_GROUP = ("mesh", "strands", "pins", "springs")
 """Sections that decide how much a segment resists its ring."""
-RelativeFriction = Annotated[float, Field(ge=0.01, le=100)]
 LONGEST_BUILD_S = 100.0
 """Estimated time to build a body, above which it is refused, s."""
 
 
-class Mesh(Section):
-    """Geometry of the helical mesh (lengths in m)."""
-
-    segment_fields: ClassVar[tuple[str, ...]] = ("radius_m",)
-    n_segments: Annotated[int, Field(ge=3, le=200)] = Field(default=3, description="actuated segments")
-    n_helices: Annotated[int, Field(ge=6, le=96)] = Field(
-        default=12, description="strands, half of each handedness; even"
-    )
-    radius_m: PerSegmentOf[Length] = Field(
-        default=0.16,
-        description="radius of the tube at rest, one number for all or one per segment: that of its ring, linear "
-        "between two rings and the same beyond the first and the last",
-    )
-    angular_rate_rad_per_m: Annotated[float, Field(ge=1e-3, le=1e4)] = Field(
-        default=14.0, description="turn of a strand per metre of body; the pitch is 2 pi over this"
-    )
-    elements_per_side: Annotated[int, Field(ge=1, le=32)] = Field(
-        default=3, description="straight elements between neighbouring crossings"
-    )
-    elements_per_end: Annotated[int, Field(ge=1, le=32)] | None = Field(
-        default=None, description="straight elements in each free end of a strand; default as many as in a side"
-    )
-    planes_between_rings: Annotated[int, Field(ge=2, le=50)] = Field(
-        default=4, description="crossing planes from one ring to the next"
-    )
-    free_planes_at_ends: Annotated[int, Field(ge=1, le=50)] = Field(
-        default=3, description="crossing planes before the first and after the last ring"
-    )
-    rear_overhang_m: Annotated[float, Field(ge=1e-4, le=1e3)] | None = Field(
-        default=None,
-        description="free strand behind the last crossing, along the body; default half a plane spacing",
-    )
-
-    @field_validator("n_helices")
-    @classmethod
-    def _even(cls, value: int) -> int:
-        if value % 2:
-            raise ValueError("the number of helices must be even, half of each handedness, and at least 6")
-        return value
-
-    @property
-    def radii_m(self) -> list[float]:
-        """Radius of every ring at rest, m."""
-        return self.of_each("radius_m", self.n_segments)
-
-
-class Strands(Section):
-    """Material of the strands.
-
-    Where segments differ, each part has the value of the segment whose ring is nearest at rest, and midway between two
-    rings their mean.
-    """
-
-    segment_fields: ClassVar[tuple[str, ...]] = ("young_modulus_Pa", "shear_modulus_Pa", "linear_density_kg_per_m")
-    radius_m: Length = Field(default=0.002, description="radius of the solid round cross-section")
-    young_modulus_Pa: PerSegmentOf[Modulus] = Field(
-        default=0.3e9, description="resists bending, one number for all or one per segment"
-    )
-    shear_modulus_Pa: PerSegmentOf[Modulus] = Field(
-        default=0.2e9, description="resists twisting, one number for all or one per segment"
-    )
-    relative_stiffness: tuple[Annotated[float, Field(ge=1e-3, le=1e3)], ...] | None = Field(
-        default=None,
-        description="of every strand, in bending and in twist, over what moduli and radius give: one number per "
-        "strand, first all clockwise ones, then all others (not set: all alike)",
-    )
-    linear_density_kg_per_m: PerSegmentOf[Positive] = Field(
-        default=0.01291, description="mass per length of strand, one number for all or one per segment"
-    )
-    damping_time_s: NonNegative = Field(
-        default=0.145,
-        description="Kelvin-Voigt time of the material, its viscous over its elastic modulus, for bending in every "
-        "direction and twist",
-    )
-
-    @property
-    def bending_rigidity_Nm2(self) -> float:
-        """Bending moment per curvature, E I, N m^2."""
-        return self.one_number("young_modulus_Pa") * pi * self.radius_m**4 / 4
-
-    @property
-    def stiffness_differs(self) -> bool:
-        """Whether it is not that of one material everywhere."""
-        moduli = (self.young_modulus_Pa, self.shear_modulus_Pa)
-        along = any(isinstance(value, tuple) and len(set(value)) > 1 for value in moduli)
-        return along or any(share != 1.0 for share in self.relative_stiffness or ())
-
-
-class Pins(Section):
-    """The pins that join two strands at a crossing."""
-
-    segment_fields: ClassVar[tuple[str, ...]] = ("mass_kg",)
-    mass_kg: PerSegmentOf[Positive] = Field(
-        default=0.00052,
-        description="mass of one pin, one number for all or one per segment: for pins nearest to its ring, midway "
-        "between two rings the mean",
-    )
-    radius_m: Length = Field(default=0.005, description="radius of the drawn sphere")
-
-
-class Joints(Section):
-    """Resistance of the crossings to a change of the angle between their two strands."""
-
-    dry_friction_Nm: NonNegative = Field(
-        default=0.0, description="Coulomb torque of one crossing, at the angle it has at rest"
-    )
-    viscous_friction_Nms_per_rad: NonNegative = Field(
-        default=0.0, description="torque of one crossing per angular velocity, at the angle it has at rest"
-    )
-
-
-class Springs(Section):
-    """Axial springs between crossings two planes apart at the same angle."""
-
-    segment_fields: ClassVar[tuple[str, ...]] = ("stiffness_N_per_m", "rest_length_m")
-    stiffness_N_per_m: PerSegmentOf[NonNegative] = Field(
-        default=19.9,
-        description="spring rate, one number for all or one per segment: for springs whose middle is nearest to its "
-        "ring, midway between two rings the mean",
-    )
-    rest_length_m: PerSegmentOf[Positive] | None = Field(
-        default=None,
-        description="one number for all or one per segment, as the stiffness (not set: as drawn, unstretched at rest)",
-    )
-    tension_only: bool = Field(default=False, description="true: slack below rest length; false: pushes as well")
-    sensors: Literal["all", "sides"] = Field(
-        default="all",
-        description="which of the springs that span a ring carry a stretch sensor: all, or the leftmost (-y) and the "
-        "rightmost",
-    )
-
-    @property
-    def first_sensor(self) -> str:
-        """Where the first stretch sensor of a segment lies, in words."""
-        return "first helix" if self.sensors == "all" else "left side"
-
-
-class WormBody(BodyKind):
+class WormBody(MeshBody):
     """Any 3D worm of helical strands, rings and springs on the ground."""
 
     cites: ClassVar[tuple[tuple[str, str], ...]] = (
@@ -176,22 +38,6 @@ class WormBody(BodyKind):
     needs_arena: ClassVar[bool] = True
     can_be_pushed: ClassVar[bool] = True
     has_skin: ClassVar[bool] = True
-    segment_fields: ClassVar[tuple[str, ...]] = ("relative_friction",)
-    heading_deg: Annotated[float, Field(ge=-360, le=360)] = Field(
-        default=0.0,
-        description="where the worm leads at the start, about its front end: 0 is towards -x, positive to its left "
-        "(90: towards -y)",
-    )
-    relative_friction: PerSegmentOf[RelativeFriction] | None = Field(
-        default=None,
-        description="friction of the skin over that of the arena, one number for all or one per segment: for the skin "
-        "nearest to its ring, midway between two rings the mean (not set: 1)",
-    )
-    mesh: Mesh = Mesh()
-    strands: Strands = Strands()
-    pins: Pins = Pins()
-    joints: Joints | None = None
-    springs: Springs = Springs()
     rings: Annotated[ActuatorKind, Choice()] = Field(default_factory=lambda: default_of(ActuatorKind))
     formulation: Annotated[FormulationKind, Choice()] = Field(default_factory=lambda: default_of(FormulationKind))
 
@@ -208,17 +54,6 @@ class WormBody(BodyKind):
     def has_halves(self) -> bool:
         """Whether its rings are halved."""
         return self.rings.layout == "halves"
-
-    @property
-    def n_segments(self) -> int:
-        """Number of actuated segments."""
-        return self.mesh.n_segments
-
-    @property
-    def relative_frictions(self) -> list[float]:
-        """Friction of every segment's skin over that of the arena."""
-        given = self.relative_friction is not None
-        return self.of_each("relative_friction", self.n_segments) if given else [1.0] * self.n_segments
 
     def groups(self) -> list[tuple[list[int], Self]]:
         """Groups the segments whose mesh, strands, pins and springs are alike.
@@ -243,11 +78,12 @@ class WormBody(BodyKind):
     @property
     def muscles(self) -> Rings:
         """The ring muscles; `ConfigError` where the rings have actuators of another kind."""
-        if self.rings.muscle is None:
+        muscle = self.rings.muscle
+        if muscle is None:
             raise ConfigError(
                 f"body.rings.kind = {self.rings.kind!r} has no muscles; this needs body.rings.kind = 'muscle'"
             )
-        return self.rings.muscle
+        return cast("Rings", muscle)
 
     def cited(self) -> tuple[tuple[str, str], ...]:
         """Returns the engine and the robot, and what formulation, strands and actuators rest on."""

@@ -8,7 +8,6 @@ overridden by its dotted path (``body.mesh.n_segments=4``). A level of `fidelity
 
 from __future__ import annotations
 
-from annelid.config.arena import ArenaKind
 from annelid.config.checking import (
     REPLACED,
     check_config,
@@ -21,16 +20,7 @@ from annelid.config.checking import (
     whole_path,
 )
 from annelid.config.fidelity import LEVELS, Fidelity, find_level
-from annelid.config.kinds import (
-    BodyKind,
-    Choice,
-    ControllerKind,
-    Kind,
-    Knob,
-    OwnModel,
-    TurningKind,
-    kinds_of,
-)
+from annelid.config.kinds import Choice, Kind, Knob, kinds_of
 from annelid.config.loading import (
     add_presets,
     arena_names,
@@ -42,8 +32,9 @@ from annelid.config.loading import (
     preset_names,
     preset_text,
 )
-from annelid.config.run import Clock, Guard, Record, RunConfig, StretchSensor
+from annelid.config.run import ArenaKind, BodyKind, ControllerKind, OwnModel, RunConfig, TurningKind
 from annelid.config.sections import Length, Line, NonNegative, Positive, Section, Share
+from annelid.config.settings import Clock, Guard, Record, StretchSensor
 from annelid.config.study import Study, Vary, load_study
 from annelid.textfiles import toml_value
 

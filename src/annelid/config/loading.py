@@ -11,11 +11,10 @@ from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
-from annelid.config.arena import SHARED, ArenaKind
 from annelid.config.checking import check_config, field_value, whole_path
 from annelid.config.fidelity import HOME, RESOLUTION, find_level
-from annelid.config.kinds import BodyKind, kind_of_file
-from annelid.config.run import RunConfig
+from annelid.config.kinds import kind_of_file
+from annelid.config.run import SHARED, ArenaKind, BodyKind, RunConfig
 from annelid.errors import ConfigError, UnreadableText, listed, shown, suggest
 from annelid.registry import load_extensions
 from annelid.textfiles import check_depth, parse_toml, read_toml, toml_value

@@ -1,27 +1,37 @@
-"""The whole of a run: the worm in its arena, its controller, clock, records and guards."""
+"""The whole of a run, the families of kinds that it chooses from, and what each of them is asked.
+
+These belong together: a run is made of kinds, and a kind is checked against its run, and built for it.
+"""
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Mapping
 from functools import cache
 from importlib import resources
-from typing import Annotated, Any, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
-from annelid.config.arena import ArenaKind
-from annelid.config.kinds import BodyKind, Choice, ControllerKind, TurningKind, default_of, kinds_of
-from annelid.config.sections import Line, NonNegative, Positive, Section, Seed, Share
-from annelid.errors import listed
+from annelid.config.kinds import Choice, Kind, default_of, kinds_of
+from annelid.config.sections import Impedance, Line, NonNegative, Positive, Section, Seed, Share
+from annelid.config.settings import Clock, Contraction, Guard, Record, StretchSensor, is_multiple
+from annelid.errors import ConfigError, listed
+from annelid.registry import Registry
 from annelid.textfiles import parse_toml
 
-Timestep = Annotated[float, Field(ge=1e-6, le=1.0)]
+if TYPE_CHECKING:
+    import mujoco
+
+    from annelid.arena.course import Bore, Course
+    from annelid.arena.surface import Shape, Surface
+    from annelid.protocols import Controller, Plant, Steering
+
 MOST_SAMPLES = 10_000_000
-
-
-def _is_multiple(large: float, small: float) -> bool:
-    ratio = large / small
-    return round(ratio) >= 1 and abs(ratio - round(ratio)) < 1e-6 * ratio
+Friction = Annotated[float, Field(ge=0.01, le=100)]
+Place = Annotated[float, Field(ge=-1e4, le=1e4)]
+Post = tuple[Place, Place, Annotated[float, Field(gt=0, le=100)]]
+"""Of an upright round post: x, y and radius, m."""
 
 
 @cache
@@ -37,61 +47,277 @@ def _known(name: str) -> str:
     return name
 
 
-class Clock(Section):
-    """Time steps: one is an integer multiple of the other."""
+class Checked:
+    """What sections have in common that are checked against the rest of a run."""
 
-    control_timestep_s: Timestep = Field(default=0.001, description="step of the nervous system")
-    physics_timestep_s: Timestep = Field(default=0.005, description="step of the body")
+    def check_with(self, config: RunConfig) -> None:
+        """Checks the section against the rest of a configuration.
 
-    @model_validator(mode="after")
-    def _multiples(self) -> Self:
-        small, large = sorted((self.control_timestep_s, self.physics_timestep_s))
-        if not _is_multiple(large, small):
+        Raises:
+            ValueError: They do not fit; the message names the fields, the value and what is valid.
+        """
+
+
+class Goals(NamedTuple):
+    """Places on the ground that a worm is steered to.
+
+    Attributes:
+        points_m: x and y of each, m.
+        reach_m: Distance at which one counts as reached, m.
+    """
+
+    points_m: tuple[tuple[float, float], ...] = ()
+    reach_m: float = 0.0
+
+
+class OwnModel(NamedTuple):
+    """A robot that a file describes whole.
+
+    Attributes:
+        xml: The robot and its ground as MJCF.
+        actuators: Names of the actuators of its segments, segment by segment.
+    """
+
+    xml: str
+    actuators: tuple[str, ...]
+
+
+class Walls(NamedTuple):
+    """What stands upright on a ground.
+
+    Attributes:
+        rail_gap_m: Distance of two guard rails along x, the worm midway, m; None for none.
+        posts: x, y and radius of upright round posts, m.
+    """
+
+    rail_gap_m: float | None = None
+    posts: tuple[Post, ...] = ()
+
+
+class ControllerKind(Checked, Kind):
+    """Base of the controllers' sections.
+
+    Attributes:
+        sensor_fields: Fields of the section ``sensor`` that it uses.
+        tuned: What `annelid tune` varies unless the user says otherwise, its timing and its sensors' switching: each
+            ``FIELD=LOW:HIGH`` or ``FIELD=LOW:HIGH:log``.
+    """
+
+    registry: ClassVar[Registry[type[Any]]] = Registry("controller.kind", "annelid.control")
+    default: ClassVar[str] = "sns"
+    sensor_fields: ClassVar[frozenset[str]] = frozenset()
+    tuned: ClassVar[tuple[str, ...]] = ()
+
+    @property
+    def scheduled(self) -> tuple[Contraction, ...]:
+        """The contractions that are scheduled beforehand, none for a controller that makes them itself."""
+        return ()
+
+    @abstractmethod
+    def build(self, config: RunConfig, plant: Plant) -> Controller:
+        """Builds the controller in its initial state.
+
+        Args:
+            config: The configuration that the section is of.
+            plant: The body that it drives.
+
+        Raises:
+            ConfigError: It cannot be built with these values.
+        """
+
+
+class TurningKind(Checked, Kind):
+    """Base of the sections that scale the two sides of a worm with half-rings."""
+
+    registry: ClassVar[Registry[type[Any]]] = Registry("turning.kind", "annelid.control.turning")
+    default: ClassVar[str] = "constant"
+
+    def check_with(self, config: RunConfig) -> None:
+        """Checks that the body has two sides."""
+        if not config.body.has_halves:
             raise ValueError(
-                f"clock.control_timestep_s = {self.control_timestep_s:g} and clock.physics_timestep_s = "
-                f"{self.physics_timestep_s:g}: one must be an integer multiple of the other"
+                f"turning.kind = {self.kind!r} needs a left and a right half of every ring: body.kind = 'worm' with "
+                "body.rings.layout = 'halves'"
             )
-        return self
+
+    @property
+    def goals(self) -> Goals:
+        """The places on the ground that the worm is steered to."""
+        return Goals()
+
+    @abstractmethod
+    def build(self, n_segments: int, control_timestep_s: float) -> Steering:
+        """Builds the steering in its initial state.
+
+        Args:
+            n_segments: Segments of the worm.
+            control_timestep_s: Control step, s.
+        """
 
 
-class StretchSensor(Section):
-    """How the nervous system reads its segments' lengths."""
+class BodyKind(Checked, Kind):
+    """Base of the bodies' sections.
 
-    tolerance_m: NonNegative = Field(default=0.010, description="on while a segment is within this of its rest length")
-    hysteresis_m: NonNegative = Field(default=0.0, description="once on, stays on until this much beyond the tolerance")
-    startup_hold_s: NonNegative = Field(
-        default=0.2, description="sensor of segment 1 held off for this long at the start"
+    Attributes:
+        needs_arena: Whether it stands on an arena, the default one where none is given.
+        is_planar: Whether it is a planar worm: rhombi in a row.
+        has_skin: Whether the sides of its segments feel touch.
+        touches_ground: Whether anything of the body bears on a ground or a wall.
+        can_be_pushed: Whether a trial may push it.
+        n_segments: Actuated segments.
+    """
+
+    registry: ClassVar[Registry[type[Any]]] = Registry("body.kind", "annelid.body.worm")
+    default: ClassVar[str] = "worm"
+    needs_arena: ClassVar[bool] = False
+    is_planar: ClassVar[bool] = False
+    has_skin: ClassVar[bool] = False
+    touches_ground: ClassVar[bool] = True
+    can_be_pushed: ClassVar[bool] = False
+
+    def refuse_fidelity(self, level: str) -> None:
+        """Refuses a level of fidelity (`annelid.config.fidelity`) where it was not measured.
+
+        Raises:
+            ConfigError: The levels are not for this body.
+        """
+        raise ConfigError(
+            f"fidelity = {level!r} is for the 3D worm (body.kind = 'worm'), not for body.kind = {self.kind!r}"
+        )
+
+    @property
+    def wall_distance_m(self) -> float | None:
+        """Distance of the walls that a planar worm crawls between; None where there are none."""
+        return None
+
+    @property
+    def own_model(self) -> OwnModel | None:
+        """The model of a robot that a file describes whole; None where annelid builds it."""
+        return None
+
+    if TYPE_CHECKING:
+
+        @property
+        def n_segments(self) -> int:
+            """A field of some bodies, and follows from other fields in others."""
+            ...
+
+    @property
+    def has_halves(self) -> bool:
+        """Whether each segment has a left and a right muscle."""
+        return False
+
+    @abstractmethod
+    def build(self, config: RunConfig) -> Plant:
+        """Builds the body at rest.
+
+        Args:
+            config: The configuration that the section is of.
+
+        Raises:
+            ConfigError: It cannot be built with these values.
+        """
+
+
+class ArenaKind(Checked, Kind):
+    """Base of the arenas' sections: the fields of every ground, and what the body, the pictures and the tasks ask it.
+
+    Attributes:
+        is_closed: Whether its walls surround the worm; they are drawn so that one sees through them.
+        is_scene: Whether all that the skin touches comes from `add_own`, as geoms that the engine collides with it.
+    """
+
+    registry: ClassVar[Registry[type[Any]]] = Registry("arena.kind", "annelid.arena.kinds")
+    default: ClassVar[str] = "floor"
+    is_closed: ClassVar[bool] = False
+    is_scene: ClassVar[bool] = False
+
+    friction: Friction = Field(default=1.0, description="coefficient of sliding friction")
+    backward_friction: Friction | None = Field(
+        default=None, description="the same where the skin slides towards the worm's rear, as setae do (not set: alike)"
     )
-    noise_m: NonNegative = Field(default=0.0, description="standard deviation of the noise on every reading")
-
-
-class Record(Section):
-    """What goes into the run file how often."""
-
-    signals_interval_s: Positive = Field(default=0.005, description="interval of potentials, lengths and forces")
-    frames_interval_s: Positive = Field(default=0.04, description="interval of whole postures, for pictures and video")
-
-
-class Guard(Section):
-    """Limits at which a run stops because its numbers have run away."""
-
-    kinetic_energy_J: Positive = Field(default=20.0, description="of the whole body and of what moves in a scene")
-    height_m: Positive = Field(
-        default=1.0, description="of any crossing above the ground (in a scene: its z = 0), or off a pipe's wall"
-    )
-    edge_strain: Positive = Field(default=0.05, description="of any edge of a rod")
-    pin_gap_m: Positive = Field(default=0.15, description="between the two strands of a pinned crossing")
-    depth_m: Positive = Field(default=0.05, description="of any vertex below the ground, or outside a pipe's wall")
-    stretch: Positive = Field(
-        default=1.1, description="of any axial spring, over the length at which the strands beside it are straight"
-    )
-    ring_closure: NonNegative = Field(
-        default=1.0,
-        description="least length of any ring, over that at which the strands of neighbouring crossings touch; 0: none",
+    gravity_m_per_s2: NonNegative = Field(default=9.81, description="0 for a weightless worm")
+    contact_time_constant_s: Positive = Field(default=0.02, description="solref time constant of the contacts")
+    contact_impedance: Impedance = Field(
+        default=(0.9, 0.95, 0.001), description="solimp (d0, dwidth, width) of the contacts"
     )
 
+    @property
+    def has_setae(self) -> bool:
+        """Whether friction depends on the direction in which the skin slides."""
+        return self.backward_friction not in (None, self.friction)
 
-class Trial(Section):
+    @property
+    def has_moving_planes(self) -> bool:
+        """Whether the skin feels the ground through planes that move with it, not through a plane of the engine."""
+        return not self.is_plane or self.has_setae
+
+    @property
+    def is_plane(self) -> bool:
+        """Whether its ground is one plane."""
+        return False
+
+    @property
+    def walls(self) -> Walls:
+        """What stands upright on it."""
+        return Walls()
+
+    @property
+    def slope_rad(self) -> float:
+        """How steeply the model's axes rise towards -x, rad."""
+        return 0.0
+
+    @property
+    @abstractmethod
+    def floor_depth_m(self) -> float:
+        """How far the floor that is drawn lies below the mesh's lowest line at the start, m."""
+
+    @abstractmethod
+    def ground(self) -> Surface:
+        """Returns its surface without what stands upright on it, in the coordinates of the worm's model."""
+
+    def centre_line(self) -> Course | None:
+        """Returns the centre line of a pipe, None where there is none."""
+        return None
+
+    def bore(self) -> Bore | None:
+        """Returns the radius along the centre line, None where there is none."""
+        return None
+
+    def reach_m(self) -> tuple[float, float] | None:
+        """Returns the arc lengths of a pipe between which it bends or changes its bore, None where there is no pipe."""
+        return None
+
+    def shape(self, length_m: float) -> Shape | None:
+        """Returns the shape of its ground to be drawn, None where a plane is.
+
+        Args:
+            length_m: Length of the worm, which stands or lies in it.
+        """
+        return None
+
+    @property
+    def object_names(self) -> tuple[str, ...]:
+        """Names of the things that move in it, in the order of the model."""
+        return ()
+
+    def add_own(self, spec: mujoco.MjSpec) -> None:
+        """Adds what it has beyond its surface to a worm's spec: nothing unless `is_scene`."""
+
+    def add_panels(self, spec: mujoco.MjSpec, length_m: float) -> None:
+        """Adds geoms that hold a worm in plain MuJoCo where the ground is not one plane; they are not drawn.
+
+        Args:
+            spec: The worm's spec.
+            length_m: Length of the worm.
+        """
+
+
+SHARED = tuple(name for name in ArenaKind.model_fields if name != "kind")
+"""Fields of every arena; a worm that is put elsewhere keeps those that the place does not state."""
+
+
+class Trial(Checked, Section):
     """What goes wrong on purpose, and what a controller may not know; fields that are not set do nothing.
 
     Every random draw depends on the run's seed and the time alone, so that a run continues bit for bit.
@@ -185,7 +411,7 @@ class RunConfig(Section):
             ("record.frames_interval_s", self.record.frames_interval_s),
             ("duration_s", self.duration_s),
         ):
-            if not _is_multiple(value, step):
+            if not is_multiple(value, step):
                 raise ValueError(
                     f"{field} = {value:g} must be an integer multiple of clock.control_timestep_s = {step:g}"
                 )

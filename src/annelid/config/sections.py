@@ -22,6 +22,8 @@ Line = Annotated[str, AfterValidator(_line)]
 Positive = Annotated[float, Field(gt=0, le=1e15)]
 NonNegative = Annotated[float, Field(ge=0, le=1e15)]
 Share = Annotated[float, Field(ge=0, le=1)]
+Level = Annotated[float, Field(gt=0, le=1)]
+"""Of an activation that is not nothing."""
 Length = Annotated[float, Field(ge=1e-6, le=1e3)]
 """Of a part of a body, m."""
 Modulus = Annotated[float, Field(ge=1.0, le=1e13)]

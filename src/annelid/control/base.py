@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
 
-from annelid.config.kinds import ControllerKind
+from annelid.config.run import ControllerKind
 from annelid.config.sections import Positive, Section
 from annelid.control.stretch_sensor import lengthening_m
 from annelid.errors import ConfigError
@@ -31,7 +31,6 @@ from annelid.protocols import (
     Watched,
 )
 
-Level = Annotated[float, Field(gt=0, le=1)]
 Slope = Annotated[float, Field(ge=-100, le=100)]
 TimeConstant = Annotated[float, Field(ge=1e-3, le=1e4)]
 Pattern = TypeVar("Pattern", bound=Section)

@@ -5,21 +5,19 @@ They are pure functions of time, and sense nothing.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal, Self
+from typing import Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import Field, model_validator
 
 from annelid.clock import SLACK_S
-from annelid.config.kinds import ControllerKind
-from annelid.config.sections import NonNegative, Positive, Section
-from annelid.control.base import Level, OpenLoopController, Slope
+from annelid.config.run import ControllerKind, RunConfig
+from annelid.config.sections import Level, NonNegative, Positive
+from annelid.config.settings import Contraction
+from annelid.control.base import OpenLoopController, Slope
 from annelid.errors import ConfigError
 from annelid.protocols import Array, Plant
-
-if TYPE_CHECKING:
-    from annelid.config.run import RunConfig
 
 
 class SineWave(ControllerKind):
@@ -142,24 +140,6 @@ class TimedController(OpenLoopController[TimedWave]):
         up = since / wave.rise_s if wave.rise_s else (since >= -SLACK_S).astype(float)
         down = 1.0 - (since - release) / wave.fall_s if wave.fall_s else (since < release - SLACK_S).astype(float)
         return wave.level * np.clip(np.minimum(up, down), 0.0, 1.0)
-
-
-class Contraction(Section):
-    """One contraction of one segment's ring."""
-
-    segment: int = Field(ge=1, le=200, description="counted from 1 at the front")
-    start_s: NonNegative = Field(description="when the activation begins to rise")
-    stop_s: Positive = Field(description="when it begins to fall")
-    activation: Level = Field(default=1.0, description="level that it rises to")
-
-    @model_validator(mode="after")
-    def _starts_before_it_stops(self) -> Self:
-        if self.start_s >= self.stop_s:
-            raise ValueError(
-                f"controller.contractions: stop_s = {self.stop_s:g} of a contraction of segment {self.segment} must be "
-                f"greater than its start_s = {self.start_s:g}"
-            )
-        return self
 
 
 class Program(ControllerKind):

@@ -12,17 +12,14 @@ import warnings
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, cast
+from typing import Any, ClassVar, Literal, cast
 
 from pydantic import create_model
 
-from annelid.config.kinds import ControllerKind
+from annelid.config.run import ControllerKind, RunConfig
 from annelid.control.base import CallableController
 from annelid.errors import ConfigError, shown
 from annelid.protocols import Controller, Plant
-
-if TYPE_CHECKING:
-    from annelid.config.run import RunConfig
 
 VARIABLE = "ANNELID_CONTROLLERS"
 """Environment variable with the names of controllers that are made known, separated by commas."""

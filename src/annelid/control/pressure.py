@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from annelid.config.kinds import ControllerKind
+from annelid.config.run import ControllerKind, RunConfig
 from annelid.config.sections import NonNegative, Positive
 from annelid.control.sns import PeristalsisController, Sns
 from annelid.nervous import Network, peristalsis
 from annelid.protocols import Array, Plant, Sensation
-
-if TYPE_CHECKING:
-    from annelid.config.run import RunConfig
 
 Strength = Annotated[float, Field(ge=0, le=5)]
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 from pydantic import Field
 
 from annelid.config.kinds import Knob
+from annelid.config.run import RunConfig
 from annelid.config.sections import Positive, Section, Share
 from annelid.control.base import ControllerCode, HalfCentreKind, NeuralController, TimeConstant, design_of
 from annelid.control.sns import DRIVE_HINT
@@ -15,9 +16,6 @@ from annelid.errors import ConfigError
 from annelid.nervous import robust
 from annelid.nervous.peristalsis import DRIVE_NEURON
 from annelid.protocols import SIDES, Array, Plant, Sensation, Values
-
-if TYPE_CHECKING:
-    from annelid.config.run import RunConfig
 
 BACK = SIDES.index("back")
 

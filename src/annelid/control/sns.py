@@ -7,23 +7,21 @@ from collections.abc import Hashable, Iterable, Iterator
 from dataclasses import asdict, astuple, dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, Generic, Literal, Self, TypeVar, cast
+from typing import Any, Generic, Literal, Self, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from annelid.config.kinds import ControllerKind, Knob
-from annelid.config.run import StretchSensor
+from annelid.config.kinds import Knob
+from annelid.config.run import ControllerKind, RunConfig
 from annelid.config.sections import NonNegative, Positive, Share
+from annelid.config.settings import StretchSensor
 from annelid.control.base import ControllerCode, HalfCentreKind, NeuralController, Slope, TimeConstant, design_of
 from annelid.control.stretch_sensor import StretchSensor as StretchThreshold
 from annelid.errors import ConfigError
 from annelid.nervous import Network, NetworkState, PeristalsisParameters, Stepper, peristalsis
 from annelid.protocols import Array, Plant, Sensation, State, Values
-
-if TYPE_CHECKING:
-    from annelid.config.run import RunConfig
 
 Config = TypeVar("Config", bound=ControllerKind)
 DRIVE_HINT = "Descending drive: more of it makes the wave faster."

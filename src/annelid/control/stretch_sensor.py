@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from annelid.clock import SLACK_S
-from annelid.config.run import StretchSensor as StretchSettings
+from annelid.config.settings import StretchSensor as StretchSettings
 from annelid.errors import require_at_least
 from annelid.protocols import Array
 

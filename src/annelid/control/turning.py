@@ -8,30 +8,27 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
 
 from annelid.clock import SLACK_S
-from annelid.config.kinds import Goals, TurningKind
-from annelid.config.sections import NonNegative, Positive
-from annelid.control.base import Coded, ControllerCode, Level, SavedWrapper, TimeConstant, heading_angle
+from annelid.config.run import Goals, RunConfig, TurningKind
+from annelid.config.sections import Level, NonNegative, Positive
+from annelid.control.base import Coded, ControllerCode, SavedWrapper, TimeConstant, heading_angle
 from annelid.errors import ConfigError
 from annelid.protocols import (
     SIDES,
     Array,
     Controller,
-    SavedAndRecorded,
     Sensation,
     Stateful,
+    Steering,
     StridingController,
     Values,
 )
-
-if TYPE_CHECKING:
-    from annelid.config.run import RunConfig
 
 Modulation = Annotated[float, Field(ge=-1, le=1)]
 Waypoint = tuple[Annotated[float, Field(ge=-1e4, le=1e4)], Annotated[float, Field(ge=-1e4, le=1e4)]]
@@ -67,7 +64,7 @@ class SteeringKind(TurningKind):
 
     def build(self, n_segments: int, control_timestep_s: float) -> Steering:
         """Builds the steering, as `TurningKind.build`."""
-        return Steering(self, n_segments, control_timestep_s)
+        return RuleSteering(self, n_segments, control_timestep_s)
 
     @abstractmethod
     def _at_start(self) -> Now:
@@ -369,13 +366,13 @@ class TouchTurning(SteeringKind):
         return {"senses": ("touch_N",), "statements": statements, "constants": constants, "state": state}
 
 
-class Steering(SavedAndRecorded):
-    """What is left of the activation of the two halves of every ring, at every control step."""
+class RuleSteering(Steering):
+    """A steering by the rule of its section of the configuration."""
 
     recorded = (("half_scale", ("segment", "half"), "1", "share of its activation that half a ring is left"),)
 
     def __init__(self, rule: SteeringKind, n_segments: int, control_timestep_s: float) -> None:
-        """Begins with all halves whole, by the rule of its section of the configuration."""
+        """Begins with all halves whole."""
         self._rule, self._n_segments, self._timestep_s = rule, n_segments, control_timestep_s
         self.reset()
 
@@ -384,13 +381,13 @@ class Steering(SavedAndRecorded):
         self._now = self._rule._at_start()
 
     def advance(self, sensation: Sensation, n_steps: int) -> Array:
-        """Takes control steps with the same sensation but for its time, and returns `scales`."""
+        """Takes control steps, as `Steering.advance`."""
         for _ in range(n_steps):
             self._rule._advance(self._now, sensation, self._timestep_s)
         return self.scales()
 
     def code(self) -> dict[str, Any]:
-        """Returns a step as C: fields of `ControllerCode`, and statements that multiply the activation."""
+        """Returns a step as C, as `Steering.code`."""
         return self._rule._code(self._timestep_s, self._n_segments)
 
     def scales(self) -> Array:

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
-from annelid.config.kinds import ControllerKind
+from annelid.config.run import ControllerKind, RunConfig
 from annelid.control.sns import PeristalsisController, Sns
 from annelid.nervous import Network, peristalsis
 from annelid.protocols import Plant
-
-if TYPE_CHECKING:
-    from annelid.config.run import RunConfig
 
 
 class WaitingSns(ControllerKind):

@@ -17,7 +17,6 @@ from importlib.metadata import PackageNotFoundError, requires, version
 from importlib.util import find_spec
 from pathlib import Path
 
-import annelid
 from annelid.draw.gl import UNSET, candidates, find_backend, works
 from annelid.engine import REMEDY, mixed_engine
 from annelid.errors import RenderingUnavailable
@@ -174,7 +173,7 @@ def _processor() -> str:
 
 def _commit() -> str:
     """The commit of the checkout that annelid is imported from, and whether files differ from it; empty elsewhere."""
-    root = Path(annelid.__file__).parents[2]
+    root = Path(__file__).parents[3]
     if not (root / ".git").exists():
         return ""
     with suppress(OSError, subprocess.SubprocessError):

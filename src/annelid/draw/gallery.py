@@ -12,6 +12,7 @@ from annelid.draw.plots import figure7
 from annelid.draw.render import Progress, render_frame, render_video
 from annelid.errors import AnnelidError
 from annelid.simulation.runfile import Run
+from annelid.terminal import Console
 
 FRAME_TIME_S = 1.5  # time of the frame, as in the paper's Fig. 8; half of the run where it is shorter
 BAR_AFTER_S = 2.0
@@ -66,8 +67,6 @@ def task_bar(task: str, *, quiet: bool = False) -> Iterator[Progress | None]:
         yield None
         return
     from rich.progress import Progress as Bar
-
-    from annelid.terminal import Console
 
     began = time.monotonic()
     bar = Bar(console=Console(stderr=True), transient=True, auto_refresh=False)

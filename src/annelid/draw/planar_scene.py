@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from contextlib import AbstractContextManager
 from itertools import chain
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.patches import Polygon
+from matplotlib.text import Text
 from numpy.typing import NDArray
 
 from annelid.draw.canvas import activation_color, canvas
 from annelid.errors import RunFileError
 from annelid.simulation.runfile import Run
-
-if TYPE_CHECKING:
-    from matplotlib.text import Text
 
 _DPI = 100
 _CM = 100.0
@@ -31,8 +30,6 @@ class PlanarScene(AbstractContextManager):
     """
 
     def __init__(self, run: Run, width: int, height: int, *, dark: bool = False) -> None:
-        from matplotlib.patches import Polygon
-
         data = run.data
         if data.sizes.get("time", 0) == 0:
             raise RunFileError(f"{run.path} holds no samples to draw")

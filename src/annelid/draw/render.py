@@ -15,7 +15,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from annelid.analysis.gait import cycle_marks
 from annelid.analysis.rhombi import nearest_time
+from annelid.draw.canvas import WIDTH_IN, canvas, save
 from annelid.draw.overlay import background_of, legend_handle, length_name
 from annelid.errors import MissingDependency, RunFileError
 from annelid.output import whole_file, with_suffix
@@ -124,9 +126,6 @@ def render_strip(
         RunFileError: As of `render_frame`, the worm is planar, or ``n_frames`` is out of range.
         RenderingUnavailable: No OpenGL back-end works.
     """
-    from annelid.analysis.gait import cycle_marks
-    from annelid.draw.canvas import WIDTH_IN, canvas, save
-
     path = with_suffix(path, STRIP_SUFFIXES, "a strip of frames")
     fewest, most = STRIP_RANGE
     if not fewest <= n_frames <= most:

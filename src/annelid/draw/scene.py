@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from annelid.arena.geoms import GROUND_RGBA, PLAIN_RGBA, add_looks
-from annelid.body import mesh_of
-from annelid.body.actuation import crossing_site
+from annelid.body import build_spec, mesh_of
+from annelid.body.actuation import crossing_site, ring_names
 from annelid.body.formulations.rods.net import STRAND_RGBA
 from annelid.body.rows import tied_bodies
 from annelid.body.worm import WormBody
@@ -53,9 +53,6 @@ class DrawnWorm:
     """
 
     def __init__(self, config: RunConfig, background: str = "floor") -> None:
-        from annelid.body import build_spec
-        from annelid.body.actuation import ring_names
-
         assert isinstance(config.body, WormBody)
         self._behind = background_of(background)
         spec = build_spec(config)

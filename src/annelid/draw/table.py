@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from rich import box
+from rich.table import Table
+
 from annelid.analysis.comparison import LACKING, Comparison, Number, relative_difference
 from annelid.analysis.gait import Gait
 from annelid.analysis.paper import (
@@ -25,8 +28,6 @@ from annelid.config import field_value, fields_of, toml_value
 from annelid.errors import listed, shortened
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from annelid.config import RunConfig
 
 UNKNOWN = "-"
@@ -98,9 +99,6 @@ def framed_table(*headings: str, title: str | None = None, caption: str | None =
         caption: Below it.
         min_width: Least width, characters.
     """
-    from rich import box
-    from rich.table import Table
-
     table = Table(
         *headings,
         title=title,
@@ -308,8 +306,6 @@ def field_lines(config: RunConfig) -> list[str]:
 
 
 def _list(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> Table:
-    from rich.table import Table
-
     table = Table(*headings, box=None, pad_edge=False)
     for row in rows:
         table.add_row(*row)

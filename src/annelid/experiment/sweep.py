@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import cached_property
+from importlib.metadata import version
 from itertools import product, zip_longest
 from math import prod
 from pathlib import Path
@@ -20,7 +21,6 @@ import numpy as np
 import xarray as xr
 from rich.table import Table
 
-import annelid
 from annelid.config import (
     RunConfig,
     Study,
@@ -153,7 +153,7 @@ class Sweep:
                 "title": plan.study.name,
                 "study": plan.study.model_dump_json(by_alias=True),
                 "base_config": plan.base.model_dump_json(),
-                "annelid_version": annelid.__version__,
+                "annelid_version": version("annelid"),
                 "n_failed": sum(run.status == "failed" for run in self.runs),
                 "n_warned": sum(bool(run.warnings) for run in self.runs),
             },

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from annelid.body.assemble import mjcf_text
+from annelid.config import RunConfig
 from annelid.draw.render import Progress, render_video
 from annelid.errors import MissingDependency, RunFileError
 from annelid.export.page import write_page
@@ -19,10 +20,8 @@ from annelid.export.tables import write_csv_tables, write_matlab, write_parquet_
 from annelid.output import with_suffix, write_text
 from annelid.registry import FORMATS as GROUP
 from annelid.registry import Registry
-
-if TYPE_CHECKING:
-    from annelid.config import RunConfig
-    from annelid.simulation.runfile import Run
+from annelid.simulation.runfile import Run, read_checkpoint
+from annelid.simulation.worm import WormPlant
 
 WINDOW = frozenset({"--from-time", "--to-time"})
 SELECTION = WINDOW | {"--signals", "--every"}
@@ -105,9 +104,6 @@ def write_mjcf(run: Run, path: Path) -> Path:
         ConfigError: The worm is planar or started with a heading, or its friction depends on the direction.
         RunFileError: The file cannot be written.
     """
-    from annelid.simulation.runfile import read_checkpoint
-    from annelid.simulation.worm import WormPlant
-
     keyframes: list[dict[str, Any]] = []
     if not run.config.body.is_planar and run.config.body.own_model is None:
         plant = WormPlant(run.config)

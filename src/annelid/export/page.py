@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING
 
 from annelid.analysis import gait, summary
 from annelid.config import RunConfig, field_value, fields_of, toml_value
@@ -18,9 +17,7 @@ from annelid.errors import AnnelidError
 from annelid.markdown import anchors, code, emphasis, table, words
 from annelid.output import whole_file
 from annelid.references import bibtex, references_of
-
-if TYPE_CHECKING:
-    from annelid.simulation.runfile import Run
+from annelid.simulation.runfile import Run
 
 
 def write_page(run: Run, path: Path, progress: Progress = lambda done, total: None) -> Path:

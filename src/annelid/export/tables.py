@@ -15,11 +15,11 @@ import xarray as xr
 
 from annelid.errors import RunFileError, suggest
 from annelid.output import whole_file, write_csv, write_json
+from annelid.simulation.runfile import Run
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-    from annelid.simulation.runfile import Run
 
 CLOCKS = {"time": "time", "frame": "frame_time"}
 """Dimensions that go with time, and the variable that has it."""

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import sys
+import warnings
 from time import perf_counter, sleep
+
+import glfw
+import mujoco.viewer
 
 from annelid.config import RunConfig
 from annelid.draw.scene import DrawnWorm
@@ -32,8 +36,6 @@ def show_native(source: RunConfig | Run, *, speed: float = 1.0) -> None:
     """
     config = config_of(source)
     _require_display()
-    import mujoco.viewer
-
     player, _ = player_of(source, speed)
     worm = DrawnWorm(config)
     pressed: list[int] = []
@@ -63,10 +65,6 @@ def show_native(source: RunConfig | Run, *, speed: float = 1.0) -> None:
 
 def _require_display() -> None:
     """Opens and closes a hidden window, since MuJoCo's own would wait for ever where none can be opened."""
-    import warnings
-
-    import glfw
-
     if sys.platform == "darwin":
         return
     with warnings.catch_warnings():

@@ -17,13 +17,13 @@ from annelid.live.network import colors_html, network_html
 from annelid.live.picture import CONTACT_COLOR, SPRING_COLORS, SPRING_RANGE, STRAND_COLORS
 from annelid.live.player import FASTEST, SLOWEST
 from annelid.live.stage import LAYERS
+from annelid.live.view import View
 from annelid.morphology import Array
 from annelid.nervous.drawing import by_segment, role_of
 
 if TYPE_CHECKING:
     import viser
 
-    from annelid.live.show import Show
 
 PLAY, NOW, AGAIN = "Play / pause", "Live", "Restart"
 STRONGEST_POKE = 1.5  # in weights of the worm; more would tear it
@@ -106,7 +106,7 @@ class Panel:
     def __init__(
         self,
         server: viser.ViserServer,
-        show: Show,
+        view: View,
         speed: float,
         weight_N: float,
         legend: str,
@@ -114,16 +114,16 @@ class Panel:
     ) -> None:
         """Makes all elements; the worm's weight on Earth is what pokes are measured by."""
         gui = self._gui = server.gui
-        self._player = player = show.player
+        self._player = player = view.player
         gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
         gui.main_panel.dock_right()
         self._status = gui.add_html("")
-        self._transport(show, speed)
+        self._transport(view, speed)
         self._knobs: dict[Knob, Any] = {}
         self._poke: Any = None
         if player.worm is not None:
-            self._physics(show, player.worm.config, weight_N)
-        network = network_of(show.config, neurons) if (neurons := neurons_of(player.reel.names)) else None
+            self._physics(view, player.worm.config, weight_N)
+        network = network_of(view.config, neurons) if (neurons := neurons_of(player.reel.names)) else None
         self._n_neurons, self._colors = len(neurons), None
         if network is not None:
             with gui.add_folder("Network, coloured by potential", expand_by_default=len(neurons) <= MOST_NEURONS):
@@ -134,15 +134,15 @@ class Panel:
         self._chart: Any = None
         with self._plot_folder:
             choice = gui.add_dropdown("plot", list(self._plots), initial_value=next(iter(self._plots)))
-            choice.on_update(lambda event: show.ask(self.choose_plot, str(event.target.value)))
+            choice.on_update(lambda event: view.ask(self.choose_plot, str(event.target.value)))
         with gui.add_folder("Colours"):
             gui.add_html(legend)
         with gui.add_folder("Shown", expand_by_default=False):
             follow = gui.add_checkbox("follow the worm", initial_value=True)
-            follow.on_update(lambda event: show.ask(setattr, show, "follow", bool(event.target.value)))
+            follow.on_update(lambda event: view.ask(setattr, view, "follow", bool(event.target.value)))
             for layer in LAYERS:
                 box = gui.add_checkbox(layer, initial_value=True)
-                box.on_update(_asking(show, show.stage.set_visible, layer))
+                box.on_update(_asking(view, view.stage.set_visible, layer))
         self.choose_plot(next(iter(self._plots)))
 
     @property
@@ -150,36 +150,37 @@ class Panel:
         """Force of a poke as set, N; 0 where nothing can be poked."""
         return float(self._poke.value) if self._poke is not None else 0.0
 
-    def _transport(self, show: Show, speed: float) -> None:
-        gui, player = self._gui, show.player
+    def _transport(self, view: View, speed: float) -> None:
+        gui, player = self._gui, view.player
         living = player.worm is not None
-        buttons = {PLAY: player.toggle, **({NOW: player.go_live} if living else {}), AGAIN: show.restart}
+        buttons = {PLAY: player.toggle, **({NOW: player.go_live} if living else {}), AGAIN: view.restart}
         live_hint = "Live: the present, and on from there. Restart: time zero, with the sliders as they are."
         row = gui.add_button_group("", list(buttons), hint=live_hint if living else "Restart: from the beginning.")
-        row.on_click(lambda event: show.ask(buttons[str(event.target.value)]))
+        row.on_click(lambda event: view.ask(buttons[str(event.target.value)]))
         self._time = gui.add_slider("time (s)", 0.0, 0.01, 0.01, 0.0, hint="Drag to look at another time.")
-        self._time.on_update(_asking(show, player.seek))
+        self._time.on_update(_asking(view, player.seek))
         hint = "Simulated seconds per second; the worm may not keep up."
         pace = gui.add_slider("speed", SLOWEST, FASTEST, 0.05, speed, hint=hint)
-        pace.on_update(_asking(show, setattr, player, "speed"))
+        pace.on_update(_asking(view, setattr, player, "speed"))
 
-    def _physics(self, show: Show, config: RunConfig, weight_N: float) -> None:
+    def _physics(self, view: View, config: RunConfig, weight_N: float) -> None:
         gui = self._gui
         with gui.add_folder("Physics"):
             for knob in knobs_of(config):
                 self._knobs[knob] = gui.add_slider(
                     knob.label, knob.low, knob.high, knob.step, knob.shown(config), hint=knob.hint
                 )
-                self._knobs[knob].on_update(_asking(show, show.turn, knob))
+                self._knobs[knob].on_update(_asking(view, view.turn, knob))
             hint = "Force of a poke, the worm's weight at first: click on the worm to push it away from you for 0.15 s."
             self._poke = gui.add_slider("poke (N)", 0.0, STRONGEST_POKE * weight_N, 0.1, weight_N, hint=hint)
             again = gui.add_button("Reset sliders", hint="Gives every slider above its first value.")
-            again.on_click(lambda _: show.ask(show.reset_knobs))
+            again.on_click(lambda _: view.ask(self._reset, view))
 
-    def show_knobs(self, config: RunConfig) -> None:
-        """Moves the sliders to what a configuration says."""
+    def _reset(self, view: View) -> None:
+        view.as_at_first()
+        assert view.player.worm is not None
         for knob, slider in self._knobs.items():
-            slider.value = knob.shown(config)
+            slider.value = knob.shown(view.player.worm.config)
 
     def choose_plot(self, name: str) -> None:
         """Puts another plot in place of the present one; it is empty until `update`."""
@@ -221,12 +222,12 @@ def _series(curve: Curve, colors: Sequence[str]) -> Any:
     return series | ({"dash": (6, 4), "width": 1.1} if curve.dashed else {"width": 1.6})
 
 
-def _asking(show: Show, call: Callable[..., Any], *first: Any) -> Callable[[Any], None]:
+def _asking(view: View, call: Callable[..., Any], *first: Any) -> Callable[[Any], None]:
     """Asks for a call with a slider's value as its last argument, if it was the user who moved it and not `Panel`."""
 
     def on_update(event: Any) -> None:
         if event.client_id is not None:
-            show.ask(call, *first, event.target.value)
+            view.ask(call, *first, event.target.value)
 
     return on_update
 

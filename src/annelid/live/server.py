@@ -18,6 +18,8 @@ from http import HTTPStatus
 from importlib import resources
 from typing import Any
 
+import rich
+
 from annelid.errors import ConfigError, MissingDependency
 
 try:
@@ -272,8 +274,6 @@ def _parts(path: str) -> tuple[bytes, bytes]:
 @contextmanager
 def _silent() -> Iterator[None]:
     """Keeps what viser prints through rich from the user's terminal."""
-    import rich
-
     console: Any = rich.get_console()
     before, console.quiet = console.quiet, True
     try:

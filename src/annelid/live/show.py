@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from annelid.config import Knob, RunConfig
-from annelid.errors import AnnelidError
+from annelid.config import RunConfig
 from annelid.live.living import Moment
 from annelid.live.panel import Panel, Plot, legend_html, status_html
 from annelid.live.picture import Painter, struck
 from annelid.live.player import config_of, player_of
 from annelid.live.server import LOOPBACK, Server
 from annelid.live.stage import Stage
+from annelid.live.view import View
 from annelid.simulation.runfile import Run
 
 if TYPE_CHECKING:
@@ -31,16 +31,11 @@ PACE_OVER_S = 2.0  # over which the speed that is reached is measured
 EARTH_M_PER_S2 = 9.81
 
 
-class Show:
+class Show(View):
     """A server with the scene and the panel of one worm, and the loop that keeps them going.
 
-    All that changes the worm, the player or the scene is done by the loop; other threads `ask` for it.
-
     Attributes:
-        player: What is shown when.
-        stage: Where it is seen.
-        panel: What is beside it.
-        follow: Whether the worm is kept in the middle, or may crawl away.
+        panel: What is beside the scene.
         address: Of the page, with the token that it opens with.
         frames_drawn: Number of pictures sent so far.
     """
@@ -67,20 +62,16 @@ class Show:
             ConfigError: The body is planar, or cannot be built.
             RunFileError: The run holds no postures.
         """
-        self.config = config_of(source)
-        self.player, anatomy = player_of(source, speed)
-        painter = Painter(anatomy, self.config)
-        self._wishes: dict[tuple[Any, ...], tuple[Callable[..., None], tuple[Any, ...]]] = {}
-        self._wishing = threading.Lock()
+        config = config_of(source)
+        player, anatomy = player_of(source, speed)
+        painter = Painter(anatomy, config)
         self._ending = threading.Event()
-        self.follow = True
-        self._notice = ""
         self._pace: deque[tuple[float, float]] = deque()
         self._drawn: tuple[Moment, bool] | None = None
         self.frames_drawn = 0
         self._server = Server(host, port)
         self.address = self._server.address
-        self.stage = Stage(self._server, self.config, painter, self.player.moment)
+        super().__init__(config, player, Stage(self._server, config, painter, player.moment))
         weight_N = round(EARTH_M_PER_S2 * anatomy.total_mass_kg, 1)
         legend = legend_html(painter.arrow_N, anatomy.geometry.radius_m)
         self.panel = Panel(self._server, self, speed, weight_N, legend, plots)
@@ -98,7 +89,7 @@ class Show:
         last = panel_due = perf_counter()
         while not self._ending.is_set():
             begun = perf_counter()
-            self._meet_wishes()
+            self.meet_wishes()
             self.player.tick(min(begun - last, LONGEST_TICK_S), deadline=begun + 1.0 / FRAMES_A_SECOND)
             last = begun
             self._draw()
@@ -115,53 +106,18 @@ class Show:
         """Lets `run` return; may be called from any thread."""
         self._ending.set()
 
-    def ask(self, call: Callable[..., None], *arguments: Any) -> None:
-        """Has the loop call something; may be called from any thread.
-
-        Of calls that differ in their last argument only, as while a slider is dragged, the last one counts.
-        """
-        with self._wishing:
-            self._wishes[call.__name__, *arguments[:-1]] = call, arguments
-
-    def restart(self) -> None:
-        """Begins anew, with the sliders as they are."""
-        self._notice = ""
-        self.player.restart()
-
-    def turn(self, knob: Knob, shown: float) -> None:
-        """Changes a field of the running worm to what a slider shows."""
-        assert self.player.worm is not None
-        self._notice = ""
-        self.player.worm.adjust({knob.field: knob.value(shown)})
-
-    def reset_knobs(self) -> None:
-        """Gives all sliders their first values."""
-        assert self.player.worm is not None
-        self._notice = ""
-        self.player.worm.as_at_first()
-        self.panel.show_knobs(self.player.worm.config)
-
     def poke(self, origin_m: tuple[float, ...], direction: tuple[float, ...]) -> None:
         """Pokes what a line of sight hits, in the page's axes, m."""
         worm = self.player.worm
         if worm is None or self.player.stopped:
             return
         if not self.player.at_end:
-            self._notice = "This is the past: press Live and poke the worm again."
+            self.notice = "This is the past: press Live and poke the worm again."
             return
         origin, sight = self.stage.to_model(np.asarray(origin_m), np.asarray(direction))
         place = struck(self.stage.picture.strands.reshape(-1, 3).astype(float), origin, sight)
         if place is not None:
             worm.poke(place, self.panel.poke_N * sight)
-
-    def _meet_wishes(self) -> None:
-        with self._wishing:
-            wishes, self._wishes = self._wishes, {}
-        for call, arguments in wishes.values():
-            try:
-                call(*arguments)
-            except AnnelidError as error:
-                self._notice = str(error)
 
     def _draw(self) -> None:
         wanted = self.player.moment, self.follow
@@ -180,9 +136,9 @@ class Show:
             self._pace.popleft()
         passed = now - self._pace[0][0]
         pace = (time_s - self._pace[0][1]) / passed if passed > 0 else 0.0
-        parts, below = [f"{time_s:.2f} s"], self._notice
+        parts, below = [f"{time_s:.2f} s"], self.notice
         if player.stopped:
-            below = f"Stopped: {player.stopped}. Move the sliders back and press Restart. {self._notice}"
+            below = f"Stopped: {player.stopped}. Move the sliders back and press Restart. {self.notice}"
         elif not player.playing:
             parts.append("paused")
         else:

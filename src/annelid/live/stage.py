@@ -20,7 +20,7 @@ from annelid.arena.kinds.floor import Floor
 from annelid.arena.surface import Shape
 from annelid.body.worm import WormBody
 from annelid.config import RunConfig
-from annelid.config.arena import ArenaKind
+from annelid.config.run import ArenaKind
 from annelid.draw.camera import FIELD_OF_VIEW_DEG, fitting_distance, picture_axes, view_angles
 from annelid.draw.scene import ROOM, upright
 from annelid.live.living import Moment

@@ -22,7 +22,7 @@ from annelid.nervous.half_centre import (
     half_centre_of_period,
     oscillation_periods,
 )
-from annelid.nervous.network import Connection, Network
+from annelid.nervous.network import Network
 from annelid.nervous.neurons import (
     Channel,
     ConnectionKind,
@@ -48,6 +48,7 @@ from annelid.nervous.peristalsis import (
 from annelid.nervous.stepper import Factors, GateStart, NetworkState, Scheme, Stepper
 from annelid.nervous.toml import network_of_tables, network_tables
 from annelid.nervous.toolbox import export_network, import_network
+from annelid.nervous.wiring import Connection
 
 __all__ = [
     "NO_GATE",

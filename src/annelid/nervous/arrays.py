@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import accumulate, pairwise, zip_longest
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +19,7 @@ from numpy.typing import NDArray
 from annelid.errors import ConfigError
 from annelid.nervous import neurons as parts
 from annelid.nervous.neurons import Array
-
-if TYPE_CHECKING:
-    from annelid.nervous.network import Network
+from annelid.nervous.wiring import Wiring
 
 Key = TypeVar("Key", bound=tuple)
 # Fills the slots of channels that have fewer gates than others: never moves, and counts as 1.
@@ -93,7 +91,7 @@ class NetworkArrays:
     weights: Array
 
 
-def build_arrays(network: Network) -> NetworkArrays:
+def build_arrays(network: Wiring) -> NetworkArrays:
     """Writes a network as arrays."""
     if not network.neurons:
         raise ConfigError(f"network {network.name!r} has no neurons: add_neuron comes first")

@@ -7,17 +7,13 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from annelid.errors import ConfigError
 from annelid.nervous.drawing import COLORS, Shape, Words, effect_of, frame_of, network_shapes, strength_of
 from annelid.nervous.key import key_shapes
-from annelid.nervous.neurons import GapJunction, ModulatorySynapse, SpikingSynapse, Synapse
+from annelid.nervous.neurons import GapJunction, ModulatorySynapse, Neuron, SpikingSynapse, Synapse
+from annelid.nervous.wiring import Wiring
 from annelid.text import printable
-
-if TYPE_CHECKING:
-    from annelid.nervous.network import Network
-    from annelid.nervous.neurons import Neuron
 
 # What Graphviz draws for each effect.
 _EDGES = {
@@ -66,7 +62,7 @@ class Diagram:
         return target
 
 
-def draw_diagram(network: Network, *, details: bool = True) -> Diagram:
+def draw_diagram(network: Wiring, *, details: bool = True) -> Diagram:
     """Draws a network.
 
     Open triangles excite, filled dots inhibit, dashed lines to open squares modulate; gap junctions are resistors,
@@ -84,7 +80,7 @@ def draw_diagram(network: Network, *, details: bool = True) -> Diagram:
     return Diagram("\n".join(_graphviz(network)) + "\n", _svg(network.name, shapes))
 
 
-def markdown_tables(network: Network) -> str:
+def markdown_tables(network: Wiring) -> str:
     """Returns neurons, connections, inputs and outputs as Markdown tables."""
     neurons = []
     for name, n in network.neurons.items():
@@ -142,7 +138,7 @@ def _quoted(text: str) -> str:
     return json.dumps(_line(text), ensure_ascii=False)
 
 
-def _graphviz(network: Network) -> Iterator[str]:
+def _graphviz(network: Wiring) -> Iterator[str]:
     yield f"digraph {_quoted(network.name)} {{"
     yield "  rankdir=LR;"
     yield "  node [shape=circle, fontsize=10];"

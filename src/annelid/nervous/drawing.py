@@ -10,15 +10,13 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from annelid.nervous.neurons import GapJunction, ModulatorySynapse
-
-if TYPE_CHECKING:
-    from annelid.nervous.network import Connection, Network
+from annelid.nervous.wiring import Connection, Wiring
 
 Points = NDArray[np.complexfloating]
 RADIUS = 0.27
@@ -75,7 +73,7 @@ class Words:
 Shape = Line | Words
 
 
-def effect_of(network: Network, connection: Connection) -> Effect:
+def effect_of(network: Wiring, connection: Connection) -> Effect:
     """Returns what a connection does: a reversal potential above its target's rest excites, another inhibits."""
     kind = connection.kind
     if isinstance(kind, GapJunction):
@@ -93,7 +91,7 @@ def strength_of(connection: Connection) -> str:
     return f"{kind.conductance_uS:.3g} uS"
 
 
-def network_shapes(network: Network, *, strengths: bool) -> list[Shape]:
+def network_shapes(network: Wiring, *, strengths: bool) -> list[Shape]:
     """Draws each neuron, connection, input and output of a network once.
 
     The shapes are in order from back to front. Their keys are ``neuron-<name>``, ``synapse-<i>`` and ``gap-<i>`` with i
@@ -250,7 +248,7 @@ class Layout(NamedTuple):
     columns: dict[int, list[str]]
 
 
-def lay_out(network: Network) -> Layout:
+def lay_out(network: Wiring) -> Layout:
     """Places neurons and leads connections around them.
 
     Names that all end in ``_<n>`` make one column for each n, its neurons row by row from the top in their order; other
@@ -325,7 +323,7 @@ def _on_circle(names: list[str]) -> dict[str, complex]:
     return {name: radius * np.exp(1j * (np.pi - 2.0 * np.pi * i / n)) for i, name in enumerate(names)}
 
 
-def _routes(network: Network, places: Mapping[str, complex], columns: Mapping[int, list[str]]) -> Iterator[Points]:
+def _routes(network: Wiring, places: Mapping[str, complex], columns: Mapping[int, list[str]]) -> Iterator[Points]:
     shared = Counter(frozenset((link.source, link.target)) for link in network.connections)
     taken: dict[frozenset[str], list[float]] = {pair: [] for pair in shared}
     arrived: dict[str, list[float]] = {name: [] for name in places}
@@ -448,7 +446,7 @@ def abbreviations(names: Iterable[str]) -> dict[str, str]:
     return short
 
 
-def labels_of(network: Network) -> dict[str, str]:
+def labels_of(network: Wiring) -> dict[str, str]:
     """Returns what stands in each neuron: the symbol of its role in a column, else its name, if long shortened."""
     written = abbreviations(network.neurons) | PAPER_SYMBOLS
     if not by_segment(network.neurons)[1]:
@@ -456,7 +454,7 @@ def labels_of(network: Network) -> dict[str, str]:
     return {n: n if len(n) <= _LONGEST_NAME else n.replace(role_of(n), written[role_of(n)], 1) for n in network.neurons}
 
 
-def meanings_of(network: Network) -> list[str]:
+def meanings_of(network: Wiring) -> list[str]:
     """Returns what labels stand for, ``"U1: contraction"``, of those that are not the names themselves."""
     labels = {role_of(name): label for name, label in labels_of(network).items() if label != name}
     return [f"{label}: {role}" for role, label in labels.items() if label != role]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,15 +19,13 @@ from annelid.nervous.drawing import (
     meanings_of,
     neuron_shapes,
 )
-
-if TYPE_CHECKING:
-    from annelid.nervous.network import Network
+from annelid.nervous.wiring import Wiring
 
 _MEANINGS_A_ROW = 4
 _ROW, _COLUMNS, _UNIT_IN = 0.62, (0.56, 6.22, 11.33), 0.45  # rows and columns, in the key's own unit
 
 
-def key_shapes(network: Network, above: Iterable[Shape], unit_in: float) -> list[Shape]:
+def key_shapes(network: Wiring, above: Iterable[Shape], unit_in: float) -> list[Shape]:
     """Draws a key below other shapes: an example of each symbol beside its name, and what labels stand for.
 
     Args:
@@ -48,7 +45,7 @@ def key_shapes(network: Network, above: Iterable[Shape], unit_in: float) -> list
     ]
 
 
-def _key(network: Network) -> list[str]:
+def _key(network: Wiring) -> list[str]:
     """What the key has to explain: only what the network has."""
     effects = {effect_of(network, link) for link in network.connections}
     neurons = network.neurons.values()

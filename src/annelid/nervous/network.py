@@ -1,40 +1,23 @@
-"""A network of neurons that a user builds by name."""
+"""A network of neurons that a user builds by name, and all that can be made of it."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
-from annelid.errors import ConfigError, require_finite, shown, suggest
 from annelid.nervous.arrays import NetworkArrays, build_arrays
 from annelid.nervous.diagram import Diagram, draw_diagram, markdown_tables
-from annelid.nervous.neurons import ConnectionKind, GapJunction, ModulatorySynapse, Neuron, SpikingSynapse, Synapse
 from annelid.nervous.stepper import Scheme, Stepper
 from annelid.nervous.toml import read_network, write_network
+from annelid.nervous.wiring import Wiring
 
 
-@dataclass(frozen=True, slots=True)
-class Connection:
-    """A synapse or gap junction between two named neurons.
-
-    Attributes:
-        source: Name of the presynaptic neuron.
-        target: Name of the postsynaptic neuron.
-        kind: What joins them.
-    """
-
-    source: str
-    target: str
-    kind: ConnectionKind
-
-
-class Network:
+class Network(Wiring):
     """Neurons, synapses, inputs and outputs, each known by its name; `compile` makes it run.
 
     All are in the order in which they were added, which is that of the columns of every array of the compiled network.
-    They are for reading; the methods below add to them, and check what is added.
+    They are for reading; the methods add to them, and check what is added.
 
     Attributes:
         name: What to call the network.
@@ -44,90 +27,6 @@ class Network:
         inputs: The neurons that each input drives.
         outputs: The neuron that each output reads.
     """
-
-    def __init__(self, name: str = "network") -> None:
-        self.name = name
-        self.neurons: dict[str, Neuron] = {}
-        self.initial_mV: dict[str, float] = {}
-        self.connections: list[Connection] = []
-        self.inputs: dict[str, tuple[str, ...]] = {}
-        self.outputs: dict[str, str] = {}
-
-    def add_neuron(self, name: str, neuron: Neuron, initial_mV: float | None = None) -> None:
-        """Adds a neuron.
-
-        Args:
-            name: Its name.
-            neuron: Its properties; one object may serve many names.
-            initial_mV: Potential at the start; default: the neuron's rest.
-
-        Raises:
-            ConfigError: The name is taken, or is no text; the potential is not finite.
-        """
-        _refuse_duplicate("neuron", name, self.neurons)
-        require_finite(**{f"neuron {shown(name)}: initial_mV": initial_mV})
-        self.neurons[name] = neuron
-        self.initial_mV[name] = neuron.rest_mV if initial_mV is None else float(initial_mV)
-
-    def add_synapse(self, source: str, target: str, synapse: Synapse | SpikingSynapse | ModulatorySynapse) -> None:
-        """Adds a graded, spiking or modulatory synapse; currents of several add up, factors of modulation multiply.
-
-        Args:
-            source: Name of the presynaptic neuron.
-            target: Name of the postsynaptic neuron.
-            synapse: Its properties.
-
-        Raises:
-            ConfigError: No neuron has one of the names (the sentence suggests the nearest), or the source of a
-                spiking synapse does not spike.
-        """
-        self._require_neurons(source, target)
-        if isinstance(synapse, SpikingSynapse) and self.neurons[source].firing is None:
-            raise ConfigError(f"neuron {source!r} has no firing, and a spiking synapse needs a source that spikes")
-        self.connections.append(Connection(source, target, synapse))
-
-    def add_gap_junction(self, source: str, target: str, junction: GapJunction) -> None:
-        """Adds a gap junction between two neurons; the order matters only for a rectified one.
-
-        Args:
-            source: Name of one neuron.
-            target: Name of the other.
-            junction: Its properties.
-
-        Raises:
-            ConfigError: No neuron has one of the names; the sentence suggests the nearest.
-        """
-        self._require_neurons(source, target)
-        self.connections.append(Connection(source, target, junction))
-
-    def add_input(self, name: str, targets: str | Sequence[str]) -> None:
-        """Adds an input.
-
-        Args:
-            name: Its name.
-            targets: Name of the neuron that its current (nA) flows into, or of several, each of which gets all of it.
-
-        Raises:
-            ConfigError: The name is taken, or no neuron has the name of a target.
-        """
-        _refuse_duplicate("input", name, self.inputs)
-        neurons = (targets,) if isinstance(targets, str) else tuple(targets)
-        self._require_neurons(*neurons)
-        self.inputs[name] = neurons
-
-    def add_output(self, name: str, source: str) -> None:
-        """Adds an output.
-
-        Args:
-            name: Its name.
-            source: Name of the neuron whose potential (mV) it reads.
-
-        Raises:
-            ConfigError: The name is taken, or no neuron has the name of the source.
-        """
-        _refuse_duplicate("output", name, self.outputs)
-        self._require_neurons(source)
-        self.outputs[name] = source
 
     def arrays(self) -> NetworkArrays:
         """Returns the network as frozen arrays.
@@ -181,7 +80,7 @@ class Network:
         return write_network(self)
 
     @classmethod
-    def from_toml(cls, text: str) -> Network:
+    def from_toml(cls, text: str) -> Self:
         """Builds a network from TOML text as `to_toml` writes it; fields left out take their defaults.
 
         Raises:
@@ -189,18 +88,3 @@ class Network:
                 synapse or network refuses; the sentence names where.
         """
         return read_network(text, cls)
-
-    def _require_neurons(self, *names: str) -> None:
-        for name in names:
-            if name not in self.neurons:
-                hint = suggest(name, self.neurons) if self.neurons else "the network has no neurons yet"
-                raise ConfigError(f"unknown neuron {shown(name)}: {hint}")
-
-
-def _refuse_duplicate(kind: str, name: str, taken: Mapping[str, object]) -> None:
-    if name in taken:
-        raise ConfigError(f"{kind} {shown(name)} exists already: every {kind} needs a name of its own")
-    try:
-        name.encode()
-    except (UnicodeEncodeError, AttributeError):
-        raise ConfigError(f"{kind} {shown(name)}: its name must be a text that can be written as UTF-8") from None

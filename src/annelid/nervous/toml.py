@@ -9,14 +9,14 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import MISSING, asdict, fields
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any, TypeVar
 
 from annelid.errors import ConfigError, require_finite, shown, suggest
 from annelid.nervous import neurons
+from annelid.nervous.wiring import Wiring
 from annelid.textfiles import parse_toml, toml_text
 
-if TYPE_CHECKING:
-    from annelid.nervous.network import Network
+Built = TypeVar("Built", bound=Wiring)
 
 KINDS: dict[str, type[neurons.ConnectionKind]] = {
     "synapse": neurons.Synapse,
@@ -27,12 +27,12 @@ KINDS: dict[str, type[neurons.ConnectionKind]] = {
 """What a connection's ``kind`` is called in the text."""
 
 
-def write_network(network: Network) -> str:
+def write_network(network: Wiring) -> str:
     """Returns a network as TOML text; every field is written, defaults too."""
     return toml_text(network_tables(network))
 
 
-def network_tables(network: Network) -> dict[str, Any]:
+def network_tables(network: Wiring) -> dict[str, Any]:
     """Returns a network as the tables of its text, plain values with every field."""
     names = {kind: name for name, kind in KINDS.items()}
     return {
@@ -50,12 +50,12 @@ def network_tables(network: Network) -> dict[str, Any]:
     }
 
 
-def read_network(text: str, make: type[Network]) -> Network:
+def read_network(text: str, make: type[Built]) -> Built:
     """Builds a network of the class ``make`` from TOML text."""
     return network_of_tables(parse_toml(text, "the network"), make)
 
 
-def network_of_tables(document: Mapping[str, Any], make: type[Network]) -> Network:
+def network_of_tables(document: Mapping[str, Any], make: type[Built]) -> Built:
     """Builds a network of the class ``make`` from the tables of a text, as `network_tables` makes them.
 
     Args:
@@ -63,7 +63,7 @@ def network_of_tables(document: Mapping[str, Any], make: type[Network]) -> Netwo
         make: Class of the network.
 
     Raises:
-        ConfigError: As of `Network.from_toml`.
+        ConfigError: As of `annelid.nervous.Network.from_toml`.
     """
     _refuse_unknown(document, {"name", "neuron", "connection", "input", "output"}, "the network")
     network = make(_string(document.get("name", "network"), "the network's name"))

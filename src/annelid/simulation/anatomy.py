@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from annelid.arena.geoms import touching
-from annelid.arena.surface import Surface, surface_of
+from annelid.arena.ground import surface_of
+from annelid.arena.surface import Surface
 from annelid.body import mesh_of
 from annelid.body.actuation import crossing_site, ring_names, stretch_sensors
 from annelid.body.formulations.rods.strains import RodVertices

@@ -10,7 +10,8 @@ import mujoco
 import numpy as np
 
 from annelid.arena.course import LEFT
-from annelid.arena.surface import Plane, surface_of
+from annelid.arena.ground import surface_of
+from annelid.arena.surface import Plane
 from annelid.body import build_spec, compile_spec
 from annelid.body.formulations.rods.strains import RodStrains, net_stiffness
 from annelid.body.rows import tendons_to_rows

@@ -11,19 +11,21 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import prod
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
+import h5py
 import numpy as np
+import pandas
+import xarray
+from h5py import Dataset, HardLink
+from h5py.h5d import VIRTUAL
+from pandas import DataFrame
 from pydantic import Field, model_validator
 
 from annelid.config import Line, Positive, Section, Share, check_section
 from annelid.errors import ConfigError, MissingDependency, UnreadableText, listed, shown, suggest
 from annelid.protocols import Array
 from annelid.textfiles import read_toml
-
-if TYPE_CHECKING:
-    import h5py
-    from pandas import DataFrame
 
 MOST_BYTES = 300_000_000
 """Of a log that is read, and of each of its parts in memory: a compressed file may be small and hold terabytes."""
@@ -183,8 +185,6 @@ def _unit(name: str, given: str | None, what: str) -> tuple[str, float]:
 
 def _numbers(table: DataFrame, name: str, path: str) -> Array:
     """A column as numbers, NaN where a cell is empty."""
-    import pandas
-
     column = table[name]
     numbers = np.asarray(pandas.to_numeric(column, errors="coerce"), dtype=float)
     bad = np.flatnonzero(np.isnan(numbers) & column.notna().to_numpy())
@@ -241,8 +241,6 @@ def _instants(table: DataFrame, log_map: LogMap, path: str, notes: list[str]) ->
         raise ConfigError(f"{path} has no column {shown(log_map.time)}: {offered}")
     column = table[log_map.time]
     if column.dtype.kind not in "fiu" and column.astype(str).str.contains(r"\d[-/:T]\d").mean() > 0.5:
-        import pandas
-
         dates = pandas.to_datetime(column, errors="coerce", format="ISO8601", utc=True)
         time_s = (dates - dates.dropna().iloc[0]).dt.total_seconds().to_numpy() if dates.notna().any() else np.empty(0)
     else:
@@ -308,8 +306,6 @@ def _table(path: Path) -> DataFrame:
 
 def _text_table(path: Path) -> DataFrame:
     """A table in text, separated by semicolons, tabs, commas or spaces; where it is no comma, one may be the point."""
-    import pandas
-
     with path.open(encoding="utf-8-sig") as file:
         lines = [line for line in (file.readline(100_000) for _ in range(60)) if line.strip() and line[0] != "#"]
     if not lines:
@@ -351,7 +347,6 @@ def _text_table(path: Path) -> DataFrame:
 
 
 def _parquet(path: Path) -> DataFrame:
-    import pandas
     from pyarrow.parquet import read_metadata
 
     about = read_metadata(path)
@@ -360,7 +355,6 @@ def _parquet(path: Path) -> DataFrame:
 
 
 def _matlab(path: Path) -> DataFrame:
-    import pandas
     from scipy.io import loadmat, whosmat
 
     try:
@@ -373,10 +367,6 @@ def _matlab(path: Path) -> DataFrame:
 
 
 def _netcdf(path: Path) -> DataFrame:
-    import h5py
-    import pandas
-    import xarray
-
     with h5py.File(path, "r") as file:
         _check_hdf5(file, path)
     with xarray.open_dataset(path, engine="h5netcdf", decode_times=False, phony_dims="sort") as opened:
@@ -385,9 +375,6 @@ def _netcdf(path: Path) -> DataFrame:
 
 def _sleap(path: Path) -> DataFrame:
     """SLEAP's analysis file: places of all nodes of one track."""
-    import h5py
-    import pandas
-
     with h5py.File(path, "r") as file:
         _check_hdf5(file, path)
         if "tracks" not in file or "node_names" not in file:
@@ -403,9 +390,6 @@ def _sleap(path: Path) -> DataFrame:
 
 def _check_hdf5(file: h5py.File, path: Path) -> None:
     """Refuses variables that lie in other files, need code of others to unpack, or are too large in memory."""
-    from h5py import Dataset, HardLink
-    from h5py.h5d import VIRTUAL
-
     n_bytes = 0
     for name in file:
         if type(file.get(name, getlink=True)) is not HardLink:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import binomtest, bootstrap, kendalltau
 
 from annelid_studies.challenge.scores import Score
 from annelid_studies.challenge.tasks import REFERENCE
@@ -92,7 +93,6 @@ def interval(values: Array, statistic: Callable[[Array], Array]) -> tuple[float,
         values: Numbers of every draw, ``(n_draws, n_tasks, n_columns)``.
         statistic: From means over draws, ``(.., n_tasks, n_columns)``, to numbers, ``(..)``.
     """
-    from scipy.stats import bootstrap
 
     def of_draws(*of_tasks: NDArray[np.int64], axis: int = -1) -> Array:
         means = [values[index, task].mean(axis=-2) for task, index in enumerate(of_tasks)]
@@ -115,8 +115,6 @@ def _mean(column: str) -> Callable[[Array], Array]:
 
 def _share(which: Array) -> tuple[float, float, float]:
     """A share of runs with its 95 % interval after Wilson 1927, which is no point where all runs agree."""
-    from scipy.stats import binomtest
-
     found = binomtest(int(which.sum()), which.size).proportion_ci(method="wilson")
     return float(which.mean()), float(found.low), float(found.high)
 
@@ -207,8 +205,6 @@ def agreement(one: Mapping[tuple[str, str], float], other: Mapping[tuple[str, st
     Returns:
         Tau by every task of the first; NaN where fewer than two of its entrants are in both and differ.
     """
-    from scipy.stats import kendalltau
-
     taus: dict[str, float] = {}
     for task, own in grouped(one, lambda key: key[1]).items():
         keys = [key for key in own if key in other]

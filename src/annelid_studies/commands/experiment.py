@@ -287,7 +287,7 @@ def load_frame_command(
     annelid study load-frame --set body.strands.young_modulus_Pa=1e9 --set body.joints.dry_friction_Nm=0.01
     """
     from annelid.experiment import study_progress
-    from annelid_lab import load_frame as frame
+    from annelid_lab.calibration import load_frame as frame
 
     table = output / "load_frame.csv"
     lock(output)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from annelid.config import Clock
-from annelid.config.run import StretchSensor as SensorSection
+from annelid.config.settings import StretchSensor as SensorSection
 from annelid.control import SnsController
 from annelid.control.sns import Sns
 from annelid.nervous import Scheme

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from math import radians
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
 from annelid.arena.course import UP
 from annelid.arena.surface import Plane, Surface
-from annelid.config.arena import ArenaKind, Post, Walls
+from annelid.config.run import ArenaKind, Post, RunConfig, Walls
 from annelid.config.sections import NonNegative, Positive
-
-if TYPE_CHECKING:
-    from annelid.config.run import RunConfig
 
 
 class Ground(ArenaKind):

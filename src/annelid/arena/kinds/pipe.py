@@ -12,14 +12,13 @@ from pydantic import Field, model_validator
 from annelid.arena.course import AHEAD, UP, Bore, Course, Curve, Straight
 from annelid.arena.kinds.floor import refuse_heading
 from annelid.arena.surface import Implicit, Level, Shape, grid_faces, lengths
-from annelid.config.arena import ArenaKind
+from annelid.config.run import ArenaKind, RunConfig
 from annelid.config.sections import NonNegative, Positive
 from annelid.protocols import Array
 
 if TYPE_CHECKING:
     import mujoco
 
-    from annelid.config.run import RunConfig
 
 ENTRY_RAMP_M = 0.1
 """Length over which the entry's clearance ends, from the worm's front on."""

@@ -11,13 +11,12 @@ from annelid.arena.course import UP
 from annelid.arena.grammar import SCENE
 from annelid.arena.mjcf import object_names, read_mjcf, validator, with_contact
 from annelid.arena.surface import Plane, Surface
-from annelid.config.arena import ArenaKind
+from annelid.config.run import ArenaKind, RunConfig
 from annelid.config.sections import NonNegative
 
 if TYPE_CHECKING:
     import mujoco
 
-    from annelid.config.run import RunConfig
 
 FLOOR = '<mujoco><worldbody><geom name="floor" type="plane" size="5 5 1" /></worldbody></mujoco>'
 

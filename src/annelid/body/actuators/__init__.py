@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
 import numpy as np
 from pydantic import Field, field_validator
 
+from annelid.body.estimates import Finding
+from annelid.body.mesh import MeshBody
 from annelid.config.kinds import Kind
 from annelid.config.sections import PerSegmentOf, Positive, Range
 from annelid.morphology import Array
@@ -16,11 +18,6 @@ from annelid.registry import Registry
 
 if TYPE_CHECKING:
     import mujoco
-
-    from annelid.body.actuators.muscle import Rings
-    from annelid.body.estimates import Finding
-    from annelid.body.worm import WormBody
-
 
 PerSegment = PerSegmentOf[Positive]
 """One number for all segments, or one for each."""
@@ -78,13 +75,19 @@ class ActuatorKind(Kind):
         """Returns the greatest force of every segment's actuators, N."""
         return self.of_each(self.force_field, n_segments)
 
+    def strongest(self, n_segments: int) -> Iterator[tuple[float, float, float]]:
+        """Returns every operating range of the rings, m, with the greatest force of an actuator that has it, N."""
+        spans, forces = self.length_ranges(n_segments), self.forces(n_segments)
+        for low, high in dict.fromkeys(spans):
+            yield low, high, max(force for own, force in zip(spans, forces, strict=True) if own == (low, high))
+
     def of_segments(self, segments: Sequence[int], n_segments: int) -> Self:
         """Returns the section with the ranges and forces of some of the segments only, counted from 0."""
         ranges, forces = self.length_ranges(n_segments), self.forces(n_segments)
         chosen = {"length_range_m": ranges, self.force_field: forces}
         return self.model_copy(update={name: tuple(values[s] for s in segments) for name, values in chosen.items()})
 
-    def findings(self, body: WormBody) -> Iterator[Finding]:
+    def findings(self, body: MeshBody) -> Iterator[Finding]:
         """Checks its lengths and forces against the mesh, before anything runs; by default nothing is doubted."""
         yield from ()
 
@@ -108,7 +111,7 @@ class ActuatorKind(Kind):
         return None
 
     @property
-    def muscle(self) -> Rings | None:
+    def muscle(self) -> ActuatorKind | None:
         """The section itself where it is of muscles."""
         return None
 

@@ -11,14 +11,13 @@ from numpy.typing import ArrayLike
 from pydantic import Field
 
 from annelid.body.actuators import ActuatorKind, PerSegment, Slopes
-from annelid.body.estimates import SHRUNK, UNSURE, Finding, bearable_force_N, crushes, rhombus_of, strongest, weak
+from annelid.body.estimates import SHRUNK, UNSURE, Finding, bearable_force_N, crushes, rhombus_of, weak
+from annelid.body.mesh import MeshBody
 from annelid.config.sections import Positive
 from annelid.morphology import Array
 
 if TYPE_CHECKING:
     import mujoco
-
-    from annelid.body.worm import WormBody
 
 LOWEST_MUSCLE, SPAN_OF_MUSCLE = 0.75, 0.3
 """The engine lays a muscle's length range from 0.75 to 1.05 of its optimal length."""
@@ -92,9 +91,9 @@ class Rings(ActuatorKind):
         """Returns the activation that acts, with a lag or at once."""
         return state if self.activation_dynamics else activation
 
-    def findings(self, body: WormBody) -> Iterator[Finding]:
+    def findings(self, body: MeshBody) -> Iterator[Finding]:
         """Checks the muscles' lengths without force against the ring at rest, and their force against the mesh."""
-        for low, high, force_N in strongest(self, body.n_segments):
+        for low, high, force_N in self.strongest(body.n_segments):
             yield from _findings(body, self, low, high, force_N)
 
     def add(self, spec: mujoco.MjSpec, name: str, span_m: list[float], force_N: float) -> None:
@@ -147,7 +146,7 @@ class Rings(ActuatorKind):
         return slopes
 
 
-def _findings(body: WormBody, rings: Rings, low: float, high: float, force_N: float) -> Iterator[Finding]:
+def _findings(body: MeshBody, rings: Rings, low: float, high: float, force_N: float) -> Iterator[Finding]:
     """The muscle's lengths without force against the ring at rest, and its force against the mesh."""
     rest, bearable = rhombus_of(body).ring_length_m, bearable_force_N(body)
     optimal = (high - low) / SPAN_OF_MUSCLE
@@ -180,7 +179,7 @@ def _findings(body: WormBody, rings: Rings, low: float, high: float, force_N: fl
     yield from crushes(rings.force_field, force_N, bearable, _settled_m(body, rings, none, optimal, force_N) / rest)
 
 
-def _settled_m(body: WormBody, rings: Rings, none_m: float, optimal_m: float, force_N: float) -> float:
+def _settled_m(body: MeshBody, rings: Rings, none_m: float, optimal_m: float, force_N: float) -> float:
     """Length at which the muscle, fully activated, pulls no more than the mesh resists, m."""
     shape = rhombus_of(body)
     hypotenuse = hypot(shape.across_m, shape.along_m)

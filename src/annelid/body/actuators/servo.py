@@ -11,14 +11,13 @@ from numpy.typing import ArrayLike
 from pydantic import Field
 
 from annelid.body.actuators import ActuatorKind, MotorPower, PerSegment, Slopes
-from annelid.body.estimates import SHRUNK, UNSURE, Finding, bearable_force_N, crushes, rhombus_of, strongest, weak
+from annelid.body.estimates import SHRUNK, UNSURE, Finding, bearable_force_N, crushes, rhombus_of, weak
+from annelid.body.mesh import MeshBody
 from annelid.config.sections import NonNegative, Positive, Range
 from annelid.morphology import Array
 
 if TYPE_CHECKING:
     import mujoco
-
-    from annelid.body.worm import WormBody
 
 
 class ServoRings(ActuatorKind):
@@ -66,9 +65,9 @@ class ServoRings(ActuatorKind):
     stiffness_N_per_m: Positive = Field(default=1000.0, description="tension of a cable per length that it lacks")
     damping_Ns_per_m: NonNegative = Field(default=10.0, description="tension of a taut cable per rate of its length")
 
-    def findings(self, body: WormBody) -> Iterator[Finding]:
+    def findings(self, body: MeshBody) -> Iterator[Finding]:
         """Checks the cables' range against the ring at rest, and their force against the mesh."""
-        for low, high, force_N in strongest(self, body.n_segments):
+        for low, high, force_N in self.strongest(body.n_segments):
             yield from _findings(body, self, low, high, force_N / self._wrap_factors[0])
 
     @property
@@ -189,7 +188,7 @@ def motor_power_W(
     return (force_N * speed_m_per_s + force_N**2 * no_load_speed_m_per_s / np.asarray(stall_force_N)).clip(0.0)
 
 
-def _findings(body: WormBody, rings: ServoRings, low: float, high: float, force_N: float) -> Iterator[Finding]:
+def _findings(body: MeshBody, rings: ServoRings, low: float, high: float, force_N: float) -> Iterator[Finding]:
     """The cables' range against the ring at rest, and their force against the mesh."""
     rest, bearable = rhombus_of(body).ring_length_m, bearable_force_N(body)
     rate = rings.stiffness_N_per_m / (1 if rings.layout == "whole" else 2)

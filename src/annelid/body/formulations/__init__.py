@@ -8,18 +8,16 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 
+from annelid.body.estimates import Finding
+from annelid.body.mesh import MeshBody, Strands
 from annelid.config.kinds import Kind
+from annelid.config.run import ArenaKind, RunConfig
 from annelid.errors import ConfigError
 from annelid.morphology import Array, MeshGeometry
 from annelid.registry import Registry
 
 if TYPE_CHECKING:
     import mujoco
-
-    from annelid.body.estimates import Finding
-    from annelid.body.worm import Strands, WormBody
-    from annelid.config.arena import ArenaKind
-    from annelid.config.run import RunConfig
 
 
 def stiffness_shares(geometry: MeshGeometry, strands: Strands) -> Array:
@@ -81,7 +79,7 @@ class FormulationKind(Kind):
     def step_cost_ms(self) -> float:
         """About how long a step of three segments with three elements a side takes, ms."""
 
-    def lacks_in_mjcf(self, body: WormBody) -> str:
+    def lacks_in_mjcf(self, body: MeshBody) -> str:
         """Returns a sentence on how a body differs from its model in an MJCF file, or ""."""
         return ""
 
@@ -107,7 +105,7 @@ class FormulationKind(Kind):
             The time, s, and the memory, GB.
         """
 
-    def check_body(self, body: WormBody) -> None:
+    def check_body(self, body: MeshBody) -> None:
         """Checks the section against the rest of its body.
 
         Raises:
@@ -120,7 +118,7 @@ class FormulationKind(Kind):
 
     @abstractmethod
     def add(
-        self, spec: mujoco.MjSpec, geometry: MeshGeometry, body: WormBody, arena: ArenaKind, *, for_plant: bool
+        self, spec: mujoco.MjSpec, geometry: MeshGeometry, body: MeshBody, arena: ArenaKind, *, for_plant: bool
     ) -> None:
         """Adds the mesh with a site at every crossing, and the solver settings that it needs.
 

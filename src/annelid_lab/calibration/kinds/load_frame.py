@@ -13,7 +13,7 @@ from annelid.config import Line, NonNegative, Positive, RunConfig
 from annelid.protocols import Array
 from annelid.textfiles import read_text
 from annelid_lab.calibration.base import Data, Experiment, Found, beside, read_columns
-from annelid_lab.load_frame import Loop, cable_force, load_frame, loop_of_table, read_loop
+from annelid_lab.calibration.load_frame import Loop, cable_force, load_frame, loop_of_table, read_loop
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import mujoco
 import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import ArrayLike
@@ -32,8 +33,6 @@ _CUTS = (
 
 def engine_flv(lengths: ArrayLike, velocities: ArrayLike, rings: Rings, activation: float = 1.0) -> Array:
     """Calls the engine's muscle for its force as a function of scaled length and velocity, as `muscle_force`."""
-    import mujoco
-
     own = rings.minimum_length, rings.maximum_length, rings.maximum_velocity, rings.passive_peak, rings.lengthening_peak
     parameters = np.array([*SCALED_RANGE, 1.0, 1.0, *own])
     # With this length range a scaled length is a length in metres.

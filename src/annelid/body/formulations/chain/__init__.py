@@ -11,15 +11,13 @@ from pydantic import Field
 
 from annelid.body.estimates import Finding, rhombus_of, softened
 from annelid.body.formulations import FormulationKind, PinReader
+from annelid.body.mesh import MeshBody
+from annelid.config.run import ArenaKind, RunConfig
 from annelid.config.sections import Impedance, NonNegative, Positive
 from annelid.morphology import Array, MeshGeometry, norm
 
 if TYPE_CHECKING:
     import mujoco
-
-    from annelid.body.worm import WormBody
-    from annelid.config.arena import ArenaKind
-    from annelid.config.run import RunConfig
 
 _RK4_DAMPED, _RK4_SWUNG = 2.78, 2.83
 """Largest products of step and rate, or frequency, at which the explicit Runge-Kutta method is stable."""
@@ -48,10 +46,8 @@ class Chain(FormulationKind):
 
     def findings(self, config: RunConfig) -> Iterator[Finding]:
         """Checks the step against the joints', the springs' and the pins' own rates."""
-        from annelid.body.worm import WormBody
-
         body, step = config.body, config.clock.physics_timestep_s
-        assert isinstance(body, WormBody)
+        assert isinstance(body, MeshBody)
         most = _largest_step_s(body, self)
         if step > most:
             problem = f"the chain is integrated explicitly, which its joints and springs bear up to about {most:.2g} s"
@@ -61,13 +57,14 @@ class Chain(FormulationKind):
             yield softened("body.formulation.pin_time_constant_s", self.pin_time_constant_s, "pins", step)
 
     def add(
-        self, spec: mujoco.MjSpec, geometry: MeshGeometry, body: WormBody, arena: ArenaKind, *, for_plant: bool
+        self, spec: mujoco.MjSpec, geometry: MeshGeometry, body: MeshBody, arena: ArenaKind, *, for_plant: bool
     ) -> None:
         """Adds the mesh as chains of capsules, which need no preparation before a step."""
         from annelid.body.formulations.chain.capsules import add_chains
 
         # Planes that move with the skin find spheres, not capsules.
-        add_chains(spec, geometry, body, self, arena, for_plant and arena.has_moving_planes)
+        pin = {"solref": [self.pin_time_constant_s, 1.0], "solimp": [*self.pin_impedance, 0.5, 2.0]}
+        add_chains(spec, geometry, body, arena, self.armature_kg_m2, pin, for_plant and arena.has_moving_planes)
 
     def pin_reader(self, model: mujoco.MjModel, geometry: MeshGeometry) -> tuple[PinReader | None, tuple[str, ...]]:
         """Reads the residual of the engine's connections, as `FormulationKind.pin_reader`."""
@@ -87,7 +84,7 @@ class Chain(FormulationKind):
         return gap, ("xpos", "xmat")
 
 
-def _largest_step_s(body: WormBody, formulation: Chain) -> float:
+def _largest_step_s(body: MeshBody, formulation: Chain) -> float:
     """Largest stable step of the explicit Runge-Kutta method, s, from the joints' and the springs' own rates."""
     strands, element = body.strands, rhombus_of(body).side_m / body.mesh.elements_per_side
     density = strands.one_number("linear_density_kg_per_m")

@@ -9,7 +9,7 @@ constraints.
 from __future__ import annotations
 
 from math import pi
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -18,22 +18,28 @@ from annelid.arena.geoms import skin_options
 from annelid.body.actuation import crossing_site, mark_crossing
 from annelid.body.formulations import densities_kg_per_m, stiffness_shares
 from annelid.body.formulations.rods.net import AXES, STRAND_RGBA, add_touch
+from annelid.body.mesh import MeshBody, Strands
 from annelid.body.rows import add_row
-from annelid.body.worm import Strands, WormBody
 from annelid.config import ArenaKind
 from annelid.morphology import Array, MeshGeometry
-
-if TYPE_CHECKING:
-    from annelid.body.formulations.chain import Chain
 
 SOLVER_ITERATIONS = 500
 """As the authors' model files have it; the tolerance is the engine's default."""
 
 
 def add_chains(
-    spec: mujoco.MjSpec, geometry: MeshGeometry, body: WormBody, formulation: Chain, arena: ArenaKind, spheres: bool
+    spec: mujoco.MjSpec,
+    geometry: MeshGeometry,
+    body: MeshBody,
+    arena: ArenaKind,
+    armature_kg_m2: float,
+    pin_solver: dict[str, list[float]],
+    spheres: bool,
 ) -> None:
-    """Adds the mesh as chains of capsules, which touch by spheres at their vertices if so, and the paper's solver."""
+    """Adds the mesh as chains of capsules, which touch by spheres at their vertices if so, and the paper's solver.
+
+    Pins are held by constraints with the ``solref`` and ``solimp`` of ``pin_solver``.
+    """
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
     spec.option.solver = mujoco.mjtSolver.mjSOL_PGS
     spec.option.iterations = SOLVER_ITERATIONS
@@ -46,10 +52,11 @@ def add_chains(
     for strand, vertices_m in enumerate(geometry.vertices_m):
         own = {"density_kg_per_m": density, "shares": shares[:, strand], "contact": contact, "vertices_touch": spheres}
         rgba = STRAND_RGBA[strand // geometry.n_per_plane]
-        add_chain(spec, f"strand_{strand}", vertices_m, material, formulation, rgba=rgba, **own)
+        add_chain(spec, f"strand_{strand}", vertices_m, material, armature_kg_m2, rgba=rgba, **own)
     pins_kg = geometry.along(body.pins.of_each("mass_kg", n), geometry.plane_x_m)
     for crossing in range(geometry.n_crossings):
-        _add_pin(spec, geometry, crossing, body, formulation, float(pins_kg[geometry.crossing_plane[crossing]]))
+        mass_kg = float(pins_kg[geometry.crossing_plane[crossing]])
+        _add_pin(spec, geometry, crossing, body.pins.radius_m, mass_kg, pin_solver)
 
 
 def add_chain(
@@ -57,7 +64,7 @@ def add_chain(
     name: str,
     vertices_m: Array,
     strands: Strands,
-    formulation: Chain,
+    armature_kg_m2: float,
     *,
     contact: list[dict[str, Any]] | None = None,
     density_kg_per_m: Array | None = None,
@@ -111,11 +118,11 @@ def add_chain(
             joint_vertex = element if direction > 0 else element + 1
             parent = add_element(parent, element, joint_vertex, origin)
             origin = vertices_m[joint_vertex]
-            _add_joint(parent, vertices_m, joint_vertex, strands, formulation, shares[:, joint_vertex - 1].tolist())
+            _add_joint(parent, vertices_m, joint_vertex, strands, armature_kg_m2, shares[:, joint_vertex - 1].tolist())
 
 
 def _add_joint(
-    link: mujoco.MjsBody, vertices_m: Array, vertex: int, strands: Strands, formulation: Chain, shares: list[float]
+    link: mujoco.MjsBody, vertices_m: Array, vertex: int, strands: Strands, armature_kg_m2: float, shares: list[float]
 ) -> None:
     """Joins two elements at a vertex; the joint stands for half of each, as stiff as the material times its shares."""
     before, after = vertices_m[vertex] - vertices_m[vertex - 1], vertices_m[vertex + 1] - vertices_m[vertex]
@@ -132,13 +139,18 @@ def _add_joint(
             type=mujoco.mjtJoint.mjJNT_HINGE,
             stiffness=[stiffness, 0.0, 0.0],
             damping=[strands.damping_time_s * stiffness, 0.0, 0.0],
-            armature=formulation.armature_kg_m2,
+            armature=armature_kg_m2,
             axis=axis,
         )
 
 
 def _add_pin(
-    spec: mujoco.MjSpec, geometry: MeshGeometry, crossing: int, body: WormBody, formulation: Chain, mass_kg: float
+    spec: mujoco.MjSpec,
+    geometry: MeshGeometry,
+    crossing: int,
+    radius_m: float,
+    mass_kg: float,
+    solver: dict[str, list[float]],
 ) -> None:
     name = crossing_site(crossing)
     vertex = int(geometry.crossing_vertex[geometry.crossing_plane[crossing]])
@@ -146,8 +158,7 @@ def _add_pin(
     pin = spec.worldbody.add_body(name=name, pos=geometry.crossings_m[crossing])
     for axis in AXES:
         pin.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
-    mark_crossing(pin, name, body.pins.radius_m, mass_kg)
-    solver = {"solref": [formulation.pin_time_constant_s, 1.0], "solimp": [*formulation.pin_impedance, 0.5, 2.0]}
+    mark_crossing(pin, name, radius_m, mass_kg)
     connect, bodies = mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtObj.mjOBJ_BODY
     for k, link in enumerate(links):
         add_row(spec, connect, bodies, f"pin_{crossing}_{k}", name, link.name, data=[0.0] * 12, **solver)

@@ -10,16 +10,14 @@ from pydantic import Field
 
 from annelid.body.estimates import Finding
 from annelid.body.formulations import BDF2_SHARE, FormulationKind, PinReader, Tie
+from annelid.body.mesh import MeshBody
+from annelid.config.run import ArenaKind, RunConfig
 from annelid.config.sections import Positive
 from annelid.errors import ConfigError
 from annelid.morphology import Array, MeshGeometry, norm
 
 if TYPE_CHECKING:
     import mujoco
-
-    from annelid.body.worm import WormBody
-    from annelid.config.arena import ArenaKind
-    from annelid.config.run import RunConfig
 
 
 class Rods(FormulationKind):
@@ -64,7 +62,7 @@ class Rods(FormulationKind):
         """Whether the strands of a crossing share its vertex."""
         return self.pins == "shared"
 
-    def lacks_in_mjcf(self, body: WormBody) -> str:
+    def lacks_in_mjcf(self, body: MeshBody) -> str:
         """Says that MJCF has one stiffness for a rod, as `FormulationKind.lacks_in_mjcf`."""
         if body.mesh.elements_per_side == 1:
             return ""
@@ -86,12 +84,13 @@ class Rods(FormulationKind):
             yield Finding(field, step, problem, f"set at most {most:g}")
 
     def add(
-        self, spec: mujoco.MjSpec, geometry: MeshGeometry, body: WormBody, arena: ArenaKind, *, for_plant: bool
+        self, spec: mujoco.MjSpec, geometry: MeshGeometry, body: MeshBody, arena: ArenaKind, *, for_plant: bool
     ) -> None:
         """Adds the mesh as a net of rods, whose vertices touch in any case."""
         from annelid.body.formulations.rods.net import add_rods
 
-        add_rods(spec, geometry, body, self, arena, for_plant=for_plant)
+        spec.option.impratio = self.friction_impedance_ratio
+        add_rods(spec, geometry, body, arena, self.edge_time_constant_s, self.tie, for_plant=for_plant)
 
     def pin_reader(self, model: mujoco.MjModel, geometry: MeshGeometry) -> tuple[PinReader | None, tuple[str, ...]]:
         """Reads separate pins, as `FormulationKind.pin_reader`."""

@@ -13,22 +13,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import mujoco
 import numpy as np
 
 from annelid.arena.geoms import skin_options
 from annelid.body.actuation import crossing_site, mark_crossing
-from annelid.body.formulations import densities_kg_per_m
+from annelid.body.formulations import Tie, densities_kg_per_m
 from annelid.body.formulations.rods.strains import add_strains, net_stiffness, twist_name
+from annelid.body.mesh import MeshBody, Strands
 from annelid.body.rows import add_held_coordinate, add_holder, add_tie
-from annelid.body.worm import Strands, WormBody
 from annelid.config import ArenaKind
 from annelid.morphology import Array, MeshGeometry
-
-if TYPE_CHECKING:
-    from annelid.body.formulations.rods import Rods
 
 AXES = np.eye(3)
 ORIGIN = np.zeros(3)
@@ -42,34 +39,43 @@ TWIST_MASS_KG = 1e-9
 
 
 def add_rods(
-    spec: mujoco.MjSpec, geometry: MeshGeometry, body: WormBody, formulation: Rods, arena: ArenaKind, *, for_plant: bool
+    spec: mujoco.MjSpec,
+    geometry: MeshGeometry,
+    body: MeshBody,
+    arena: ArenaKind,
+    edge_time_constant_s: float,
+    tie: Tie | None,
+    *,
+    for_plant: bool,
 ) -> None:
-    """Adds the mesh as a net of rods, and the solver settings that it needs, as `FormulationKind.add`."""
+    """Adds the mesh as a net of rods, and the solver settings that it needs, as `FormulationKind.add`.
+
+    Separate pins have a tie to their strands.
+    """
     # The one combination under which stiff rods are stable: implicit in position, with Newton.
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
     spec.option.solver = mujoco.mjtSolver.mjSOL_NEWTON
     spec.option.iterations = SOLVER_ITERATIONS
     spec.option.tolerance = SOLVER_TOLERANCE
-    spec.option.impratio = formulation.friction_impedance_ratio
     # The net is one island; looking for others takes 3 % of a step.
     spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ISLAND)
     density = densities_kg_per_m(geometry, body.strands)
-    names = _add_vertices(spec, geometry, body, formulation, arena, density)
+    names = _add_vertices(spec, geometry, body, arena, tie, density)
     material = body.strands.of_segment(0)
     stiffness = net_stiffness(geometry, body.strands)
     for strand, (vertices_m, bodies) in enumerate(zip(geometry.vertices_m, names, strict=True)):
         rgba = STRAND_RGBA[strand // geometry.n_per_plane]
         rows = stiffness[:, strand] if for_plant else None
         options = {"rgba": rgba, "density_kg_per_m": density, "stiffness_Nm": rows}
-        add_rod(spec, f"strand_{strand}", vertices_m, bodies, material, formulation, **options)
+        add_rod(spec, f"strand_{strand}", vertices_m, bodies, material, edge_time_constant_s, **options)
 
 
 def _add_vertices(
     spec: mujoco.MjSpec,
     geometry: MeshGeometry,
-    body: WormBody,
-    formulation: Rods,
+    body: MeshBody,
     arena: ArenaKind,
+    tie: Tie | None,
     density_kg_per_m: Array,
 ) -> list[list[str]]:
     """Adds a body for every vertex, crossings first (which the solver is fastest with); returns each strand's names."""
@@ -78,7 +84,6 @@ def _add_vertices(
     pins_kg = geometry.along(body.pins.of_each("mass_kg", n), geometry.plane_x_m)
     contact = skin_options(arena, geometry, body.relative_frictions, x)
     names = [[vertex_name(s, v) for v in range(len(masses))] for s in range(geometry.n_strands)]
-    tie = formulation.tie
     for crossing in range(geometry.n_crossings):
         name, vertex = crossing_site(crossing), geometry.crossing_vertex[geometry.crossing_plane[crossing]]
         place, strands = geometry.crossings_m[crossing], geometry.crossing_strands[crossing]
@@ -156,7 +161,7 @@ def add_rod(
     vertices_m: Array,
     bodies: list[str],
     strands: Strands,
-    formulation: Rods,
+    edge_time_constant_s: float,
     *,
     rgba: tuple[float, float, float, float] = STRAND_RGBA[0],
     density_kg_per_m: Array | None = None,
@@ -170,7 +175,7 @@ def add_rod(
         vertices_m: Rest positions, shape ``(n_vertices, 3)``.
         bodies: Body of each vertex, at the vertex's place.
         strands: Material.
-        formulation: Settings of the inextensible edges.
+        edge_time_constant_s: Of the inextensible edges.
         rgba: Colour.
         density_kg_per_m: Mass per length of every edge, ``(n_edges,)``, instead of the material's.
         stiffness_Nm: Of the rows that resist bending and twist, ``(3, n_edges - 1)``, for a plant that renews them
@@ -207,7 +212,7 @@ def add_rod(
         type=mujoco.mjtEq.mjEQ_FLEX,
         objtype=mujoco.mjtObj.mjOBJ_FLEX,
         name1=name,
-        solref=[formulation.edge_time_constant_s, 1.0],
+        solref=[edge_time_constant_s, 1.0],
         solimp=EDGE_IMPEDANCE,
     )
     if stiffness_Nm is not None:

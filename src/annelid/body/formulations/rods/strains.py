@@ -24,18 +24,15 @@ only.
 from __future__ import annotations
 
 from math import pi
-from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from annelid.body.formulations import stiffness_shares
+from annelid.body.mesh import Strands
 from annelid.body.rows import complete_rows, row_name, row_tendon
 from annelid.morphology import Array, MeshGeometry, cross
-
-if TYPE_CHECKING:
-    from annelid.body.worm import Strands
 
 MODES = ("bend", "side", "twist")
 """Of a vertex: along its bend, across it, and about the rod."""

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import faulthandler
+import os
 import signal
 import threading
+import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future
 from pathlib import Path
@@ -19,7 +21,7 @@ from annelid.cli import app
 from annelid.config import ControllerKind, load_config
 from annelid.protocols import Sensation
 from annelid.simulation.loop import simulate
-from annelid.simulation.runfile import Run
+from annelid.simulation.runfile import Run, open_run
 from outcome import Command, Outcome
 
 # No test is judged by its time: a busy machine is no failure.
@@ -77,11 +79,50 @@ def runs_in_this_process() -> Iterator[None]:
         yield
 
 
+def made_once(factory: pytest.TempPathFactory, name: str, make: Callable[[Path], object]) -> Path:
+    """A folder that the first process to ask for it fills, for the tests of all processes.
+
+    Args:
+        factory: pytest's temporary folders, of which each process has its own below a common one.
+        name: The folder's name.
+        make: Fills the folder, which is there and empty.
+
+    Returns:
+        The folder, filled.
+    """
+    common = factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        common = common.parent
+    folder, done = common / name, common / f"{name}.done"
+    try:
+        folder.mkdir()
+    except FileExistsError:
+        while not done.exists():
+            time.sleep(0.1)
+        return folder
+    try:
+        make(folder)
+    finally:
+        done.touch()
+    return folder
+
+
+def run_made_once(factory: pytest.TempPathFactory, name: str, preset: str, duration_s: float) -> Run:
+    """A run that the tests of all processes read and none changes."""
+    config = load_config(preset, {"duration_s": duration_s})
+    return open_run(made_once(factory, name, lambda folder: simulate(config, folder, progress=False)))
+
+
 @pytest.fixture(scope="session")
 def rods_run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     """The first moments of a 3D worm, segment 1 contracting."""
-    config = load_config("riddle2023-rods", {"duration_s": 0.2})
-    return simulate(config, tmp_path_factory.mktemp("rods") / "run", progress=False)
+    return run_made_once(tmp_path_factory, "rods", "riddle2023-rods", 0.2)
+
+
+@pytest.fixture(scope="session")
+def planar_run(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    """Three seconds of the planar worm: one cycle and a bit."""
+    return run_made_once(tmp_path_factory, "planar", "riddle2022-planar", 3.0)
 
 
 @pytest.fixture(scope="session")
@@ -95,7 +136,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv(notebooks.CACHE_VARIABLE, str(tmp_path_factory.mktemp("tutorials")))
         patch.setattr(notebooks, "executed", lambda text: jupytext.reads(text, fmt="md"))
-        return build_site.build(tmp_path_factory.mktemp("build"))
+        return made_once(tmp_path_factory, "site", build_site.build) / "site"
 
 
 @pytest.fixture
@@ -133,29 +174,22 @@ def squeeze(sensation: Sensation) -> np.ndarray:
 
 
 @pytest.fixture(scope="session")
-def planar_run(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    """A second of a planar worm."""
-    config = load_config("riddle2022-planar", {"duration_s": 1.0})
-    return simulate(config, tmp_path_factory.mktemp("planar") / "run", progress=False)
-
-
-@pytest.fixture(scope="session")
 def chain_run(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    """The same as a chain of capsules."""
+    """A worm of capsules for a moment."""
     config = load_config("riddle2023", {"duration_s": 0.02})
     return simulate(config, tmp_path_factory.mktemp("chain") / "run", progress=False)
 
 
 @pytest.fixture(scope="session")
 def user_run(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    """The same worm under a user's function."""
+    """A 3D worm under a user's function."""
     config = load_config("riddle2023-rods", {"duration_s": 0.1})
     return simulate(config, tmp_path_factory.mktemp("user") / "run", controller=squeeze, progress=False)
 
 
 @pytest.fixture(scope="session", params=["planar", "rods"])
 def run(request: pytest.FixtureRequest) -> Run:
-    """Either of the two."""
+    """A planar and a 3D run."""
     return request.getfixturevalue(f"{request.param}_run")
 
 

@@ -17,19 +17,14 @@ from annelid.errors import ConfigError
 OPTIONAL = {"rail_gap_m", "posts"}
 
 
-@pytest.mark.parametrize("name", arena_names())
-def test_an_arena_states_every_field_of_its_own(name: str) -> None:
-    stated = set(tomllib.loads(arena_text(name))["arena"])
-    arena = load_config("riddle2025", arena=name).arena
-    assert arena is not None
-    assert set(type(arena).model_fields) - set(SHARED) - OPTIONAL - stated == set()
-    assert arena_summary(name)
-
-
-@pytest.mark.parametrize("name", arena_names())
-def test_an_arena_survives_the_run_file(name: str) -> None:
-    config = load_config("riddle2025", arena=name)
-    assert RunConfig.model_validate_json(config.model_dump_json()) == config
+def test_an_arena_states_every_field_of_its_own(subtests: pytest.Subtests) -> None:
+    for name in arena_names():
+        with subtests.test(f"{name!r:.60}"):
+            stated = set(tomllib.loads(arena_text(name))["arena"])
+            arena = load_config("riddle2025", arena=name).arena
+            assert arena is not None
+            assert set(type(arena).model_fields) - set(SHARED) - OPTIONAL - stated == set()
+            assert arena_summary(name)
 
 
 def test_an_arena_keeps_the_worm_s_friction_and_gravity_unless_it_states_them() -> None:
@@ -91,9 +86,8 @@ def test_a_file_of_before_the_kinds_is_a_floor(tmp_path: Path) -> None:
     assert RunConfig.model_validate({"arena": {"friction": 0.4}}).arena == Floor(friction=0.4)
 
 
-@pytest.mark.parametrize(
-    ("arena", "field", "value", "sentence"),
-    [
+def test_a_bad_arena_is_named_with_what_would_be_valid(subtests: pytest.Subtests) -> None:
+    for arena, field, value, sentence in (
         ("pipe.bent", "seed", 0, "unknown arena 'pipe.bent'.*pipe.bend"),
         ("pipe", "arena.course", "spiral", "arena.course = 'spiral': must be one of"),
         ("pipe.taper", "arena.narrowest_m", 0.2, r"arena\.narrowest_m = 0\.2: must be less than arena\.bore_m = 0\.18"),
@@ -104,11 +98,9 @@ def test_a_file_of_before_the_kinds_is_a_floor(tmp_path: Path) -> None:
         ("rough", "arena.roughness", 0.05, r"arena\.roughness_m = 0\.05: must be at most a fifth"),
         ("floor", "arena.kind", "ice", r"arena\.kind = 'ice': must be one of"),
         ("floor", "arena.bore_m", 0.2, "another kind"),
-    ],
-)
-def test_a_bad_arena_is_named_with_what_would_be_valid(arena: str, field: str, value: object, sentence: str) -> None:
-    with pytest.raises(ConfigError, match=sentence):
-        load_config("riddle2025", {field: value}, arena=arena)
+    ):
+        with subtests.test(f"{arena!r:.60}"), pytest.raises(ConfigError, match=sentence):
+            load_config("riddle2025", {field: value}, arena=arena)
 
 
 def test_a_planar_worm_has_no_arena() -> None:

@@ -12,6 +12,7 @@ import pytest
 from annelid.body.worm import WormBody
 from annelid.config import (
     RunConfig,
+    arena_names,
     field_paths,
     fields_of,
     load_config,
@@ -48,28 +49,38 @@ def notes(text: str) -> dict[str, str]:
     return found
 
 
-@pytest.mark.parametrize("name", preset_names())
-def test_a_preset_or_its_ancestors_state_every_field_that_its_worm_has_with_its_source(name: str) -> None:
+def test_a_preset_or_its_ancestors_state_every_field_that_its_worm_has_with_its_source(
+    subtests: pytest.Subtests,
+) -> None:
     """No default hides behind a preset: what `annelid list presets NAME` prints is the whole truth."""
-    text = preset_text(name)
-    config = load_config(name)
-    stated = {path for path, value in leaves(tomllib.loads(text)).items() if value != "none"}
-    assert stated == set(leaves(config.model_dump(exclude_none=True)))
-    sources = notes(text)
-    unsourced = {path for path, note in sources.items() if note.rpartition(": ")[2] in ("", "default")}
-    planar = {path for path in sources if path.startswith("guard.")} if isinstance(config.body, PlanarWorm) else set()
-    assert unsourced == {"name", "summary"} | planar
-    origins = {note.partition(": ")[0] for note in sources.values()} & set(preset_names())
-    assert all(f"# Inherited from {origin}:" in text for origin in origins)
+    for name in preset_names():
+        with subtests.test(f"{name!r:.60}"):
+            text = preset_text(name)
+            config = load_config(name)
+            stated = {path for path, value in leaves(tomllib.loads(text)).items() if value != "none"}
+            assert stated == set(leaves(config.model_dump(exclude_none=True)))
+            sources = notes(text)
+            unsourced = {path for path, note in sources.items() if note.rpartition(": ")[2] in ("", "default")}
+            planar = (
+                {path for path in sources if path.startswith("guard.")}
+                if isinstance(config.body, PlanarWorm)
+                else set()
+            )
+            assert unsourced == {"name", "summary"} | planar
+            origins = {note.partition(": ")[0] for note in sources.values()} & set(preset_names())
+            assert all(f"# Inherited from {origin}:" in text for origin in origins)
 
 
-@pytest.mark.parametrize("name", preset_names())
-def test_a_preset_states_nothing_that_it_inherits(name: str) -> None:
+def test_a_preset_states_nothing_that_it_inherits() -> None:
     """But for a value that has another source: then it is the same by chance."""
+    alone = {name for name in preset_names() if "extends" not in tomllib.loads(own_text(name))}
+    assert alone == {"riddle2023", "riddle2022-planar"}
+    assert {name: again for name in preset_names() if name not in alone and (again := stated_again(name))} == {}
+
+
+def stated_again(name: str) -> list[str]:
+    """Fields of a preset with the value and the source that its base has."""
     own = tomllib.loads(own_text(name))
-    if "extends" not in own:
-        assert name in ("riddle2023", "riddle2022-planar")
-        return
     base = preset_text(own.pop("extends"))
     inherited, base_notes, own_notes = leaves(tomllib.loads(base)), notes(base), notes(own_text(name))
     stated = leaves(own)
@@ -78,7 +89,7 @@ def test_a_preset_states_nothing_that_it_inherits(name: str) -> None:
     )
     again = [path for path in stated if path in inherited and not path.startswith(renewed)]
     again = [path for path in again if stated[path] == inherited[path]]
-    assert [p for p in again if marks(own_notes[p]) == marks(base_notes[p])] == []
+    return [p for p in again if marks(own_notes[p]) == marks(base_notes[p])]
 
 
 def marks(note: str) -> list[str]:
@@ -115,10 +126,16 @@ def test_published_numbers_are_named_not_found_by_a_path() -> None:
     assert load_config("riddle2023", {"published": "none"}).published is None
 
 
-@pytest.mark.parametrize("name", preset_names())
-def test_a_configuration_survives_the_run_file(name: str) -> None:
-    config = load_config(name)
-    assert RunConfig.model_validate_json(config.model_dump_json()) == config
+def test_a_configuration_survives_the_run_file_and_its_printed_preset(tmp_path: Path) -> None:
+    file = tmp_path / "copy.toml"
+    for name in preset_names():
+        config = load_config(name)
+        assert RunConfig.model_validate_json(config.model_dump_json()) == config, name
+        file.write_text(preset_text(name), encoding="utf-8")
+        assert load_config(file) == config, name
+    for name in arena_names():
+        config = load_config("riddle2025", arena=name)
+        assert RunConfig.model_validate_json(config.model_dump_json()) == config, name
 
 
 def test_every_field_has_a_description() -> None:
@@ -170,13 +187,6 @@ def test_a_file_that_names_no_base_starts_from_the_rod_worm(tmp_path: Path) -> N
     assert load_config(file) == expected
 
 
-@pytest.mark.parametrize("name", preset_names())
-def test_a_printed_preset_is_a_file_of_its_own(tmp_path: Path, name: str) -> None:
-    file = tmp_path / "copy.toml"
-    file.write_text(preset_text(name), encoding="utf-8")
-    assert load_config(file) == load_config(name)
-
-
 def test_files_may_not_extend_themselves(tmp_path: Path) -> None:
     first, second = tmp_path / "first.toml", tmp_path / "second.toml"
     first.write_text(f'extends = "{second.as_posix()}"', encoding="utf-8")
@@ -194,9 +204,8 @@ def test_fields_of_a_configuration_are_those_of_its_kinds() -> None:
         load_config("riddle2023-rods", {"n_segments": 4})
 
 
-@pytest.mark.parametrize(
-    ("assignment", "sentence"),
-    [
+def test_a_bad_value_is_named_with_what_would_be_valid(subtests: pytest.Subtests) -> None:
+    for assignment, sentence in (
         ("body.mesh.n_helices=7", "body.mesh.n_helices = 7: .* even"),
         ("body.mesh.n_helices=4", "body.mesh.n_helices = 4: must be at least 6"),
         ("body.mesh.n_segments=2", "body.mesh.n_segments = 2: must be at least 3"),
@@ -229,12 +238,11 @@ def test_fields_of_a_configuration_are_those_of_its_kinds() -> None:
         ("arena.contact_impedance=[1, 2, 3]", "must be less than 1"),
         ("arena.floor_gap_m=-0.1", "must be at least 0"),
         ("arena.friction=0", "must be at least 0.01"),
-    ],
-)
-def test_a_bad_value_is_named_with_what_would_be_valid(assignment: str, sentence: str) -> None:
-    with pytest.raises(ConfigError, match=sentence) as caught:
-        load_config("riddle2023", parse_assignments([assignment]))
-    assert "\n" not in str(caught.value)
+    ):
+        with subtests.test(f"{assignment!r:.60}"):
+            with pytest.raises(ConfigError, match=sentence) as caught:
+                load_config("riddle2023", parse_assignments([assignment]))
+            assert "\n" not in str(caught.value)
 
 
 def test_a_field_of_the_other_formulation_is_refused() -> None:
@@ -259,10 +267,10 @@ def test_an_unknown_preset_suggests_the_nearest() -> None:
             load_config(typed)
 
 
-@pytest.mark.parametrize("text", ["friction", "=3", "arena..friction=1"])
-def test_an_assignment_needs_a_field_and_a_value(text: str) -> None:
-    with pytest.raises(ConfigError, match="not of the form field=value"):
-        parse_assignments([text])
+def test_an_assignment_needs_a_field_and_a_value(subtests: pytest.Subtests) -> None:
+    for text in ("friction", "=3", "arena..friction=1"):
+        with subtests.test(f"{text!r:.60}"), pytest.raises(ConfigError, match="not of the form field=value"):
+            parse_assignments([text])
 
 
 def test_unreadable_files_are_refused_in_one_sentence(tmp_path: Path) -> None:

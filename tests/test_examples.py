@@ -26,11 +26,10 @@ def example(name: str) -> ModuleType:
     return module
 
 
-@pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.py")), ids=lambda path: path.stem)
-def test_an_example_is_short_and_says_what_it_is(path: Path) -> None:
-    text = path.read_text(encoding="utf-8")
-    assert text.startswith('"""')
-    assert len(text.splitlines()) <= MOST_LINES
+def test_examples_are_short_and_say_what_they_are() -> None:
+    texts = {path.name: path.read_text(encoding="utf-8") for path in EXAMPLES.glob("*.py")}
+    assert [name for name, text in texts.items() if not text.startswith('"""')] == []
+    assert [name for name, text in texts.items() if len(text.splitlines()) > MOST_LINES] == []
 
 
 def test_setae_make_travel_of_breathing(tmp_path: Path) -> None:

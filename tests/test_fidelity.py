@@ -73,9 +73,8 @@ def test_overrides_win_over_the_level_and_the_level_over_the_file(tmp_path: Path
     assert own.body.mesh.elements_per_side == accurate.body.mesh.elements_per_side  # type: ignore[union-attr]
 
 
-@pytest.mark.parametrize(
-    ("source", "overrides", "level", "words"),
-    [
+def test_what_has_no_such_level_is_refused(subtests: pytest.Subtests) -> None:
+    for source, overrides, level, words in (
         ("riddle2023-rods", {}, "acurate", "accurate"),
         ("riddle2022-planar", {}, "fast", "body.kind = 'riddle2022'"),
         ("riddle2023-fast", {}, "preview", "pins = 'separate'"),
@@ -83,13 +82,9 @@ def test_overrides_win_over_the_level_and_the_level_over_the_file(tmp_path: Path
         ("riddle2023", {}, "paper", "the preset riddle2023"),
         ("riddle2023", {}, "fast", "body.formulation.kind = 'chain'"),
         ({"body": {"formulation": {"kind": "chain"}}}, {}, "fast", "body.formulation.kind = 'chain'"),
-    ],
-)
-def test_what_has_no_such_level_is_refused(
-    source: str | dict[str, object], overrides: dict[str, object], level: str, words: str
-) -> None:
-    with pytest.raises(ConfigError, match=words):
-        load_config(source, overrides, fidelity=level)
+    ):
+        with subtests.test(f"{source!r:.60}"), pytest.raises(ConfigError, match=words):
+            load_config(source, overrides, fidelity=level)
 
 
 def test_every_field_of_a_level_exists() -> None:

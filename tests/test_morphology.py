@@ -162,9 +162,8 @@ def test_the_later_six_segment_robot() -> None:
     assert mesh.ring_planes.tolist() == [2, 5, 8, 11, 14, 17]
 
 
-@pytest.mark.parametrize(
-    ("changes", "named"),
-    [
+def test_impossible_meshes_are_refused_by_name(subtests: pytest.Subtests) -> None:
+    for changes, named in (
         ({"n_segments": 2}, "n_segments"),
         ({"n_helices": 7}, "n_helices"),
         ({"n_helices": 4}, "n_helices"),
@@ -175,8 +174,6 @@ def test_the_later_six_segment_robot() -> None:
         ({"planes_between_rings": 1}, "planes_between_rings"),
         ({"free_planes_at_ends": 0}, "free_planes_at_ends"),
         ({"rear_overhang_m": 0.0}, "rear_overhang_m"),
-    ],
-)
-def test_impossible_meshes_are_refused_by_name(changes: dict[str, float], named: str) -> None:
-    with pytest.raises(ValidationError, match=named):
-        Mesh.model_validate(changes)
+    ):
+        with subtests.test(f"{changes!r:.60}"), pytest.raises(ValidationError, match=named):
+            Mesh.model_validate(changes)

@@ -113,16 +113,3 @@ def test_longer_worms_walk_two_ordered_cycles(tmp_path: Path, preset: str, n_seg
     period = 0.8752 * n_segments
     _, result = crawl(preset, tmp_path, **{field: n_segments, "duration_s": round(2 * period + 1.2, 3)})
     assert_wave(result, n_segments, period, 0.02)
-
-
-@pytest.mark.slow
-def test_a_longer_rod_worm_walks_in_order(tmp_path: Path) -> None:
-    """A cheap representative of the slow runs above: four segments, one cycle, coarse steps and strands."""
-    changes = {
-        "body.mesh.n_segments": 4,
-        "body.mesh.elements_per_side": 1,
-        "clock.physics_timestep_s": 0.01,
-        "record.signals_interval_s": 0.01,
-    }
-    _, result = crawl("riddle2023-rods", tmp_path, **changes, duration_s=4.4)
-    assert result.order[:6] == [1, 2, 3, 4, 1, 2]

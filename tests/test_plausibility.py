@@ -87,12 +87,8 @@ def test_the_estimate_of_the_mesh_follows_the_authors_load_frame() -> None:
     assert bearable_force_N(body) == pytest.approx(15.0, rel=0.15), "measured: rings collapse at 14 to 16 N"
 
 
-@pytest.mark.parametrize("name", preset_names())
-def test_nothing_is_found_in_a_preset(name: str) -> None:
-    assert check(load_config(name)) == []
-
-
-def test_nothing_is_found_in_an_arena_or_at_a_level() -> None:
+def test_nothing_is_found_in_a_preset_in_an_arena_or_at_a_level() -> None:
+    assert {name: found for name in preset_names() if (found := check(load_config(name)))} == {}
     for arena in arena_names():
         assert check(load_config("riddle2023-rods", arena=arena)) == []
     for level in LEVELS:
@@ -111,25 +107,27 @@ def test_setae_hold_on_a_slope_against_the_way_they_point(
     assert [finding.field for finding in found] == ["arena.slope_deg"] * slides
 
 
-@pytest.mark.parametrize(("preset", "changes", "field"), NONSENSE)
-def test_what_can_mean_nothing_is_an_error_until_it_is_set_as_said(preset: str, changes: Changes, field: str) -> None:
-    config = load_config(preset, changes)
-    found = next(finding for finding in check(config) if finding.severity == "error")
-    assert found.field == field
-    with pytest.raises(ConfigError, match=re.escape(f"{field} = ")):
-        refuse_nonsense(config)
-    better = re.search(r"set (\[.*?\])", found.instead)
-    if better:
-        mended = load_config(preset, {**changes, field: tomllib.loads(f"x = {better[1]}")["x"]})
-        assert field not in [finding.field for finding in check(mended)]
+def test_what_can_mean_nothing_is_an_error_until_it_is_set_as_said(subtests: pytest.Subtests) -> None:
+    for preset, changes, field in NONSENSE:
+        with subtests.test(f"{preset!r:.60}"):
+            config = load_config(preset, changes)
+            found = next(finding for finding in check(config) if finding.severity == "error")
+            assert found.field == field
+            with pytest.raises(ConfigError, match=re.escape(f"{field} = ")):
+                refuse_nonsense(config)
+            better = re.search(r"set (\[.*?\])", found.instead)
+            if better:
+                mended = load_config(preset, {**changes, field: tomllib.loads(f"x = {better[1]}")["x"]})
+                assert field not in [finding.field for finding in check(mended)]
 
 
-@pytest.mark.parametrize(("preset", "changes", "field"), DOUBTFUL)
-def test_what_is_doubtful_is_a_warning_with_a_number(preset: str, changes: Changes, field: str) -> None:
-    config = load_config(preset, changes)
-    assert [finding.severity for finding in check(config) if finding.field == field] == ["warning"]
-    assert any(re.search(r"\d", finding.instead) for finding in check(config) if finding.field == field)
-    assert any(sentence.startswith(f"{field} = ") for sentence in refuse_nonsense(config))
+def test_what_is_doubtful_is_a_warning_with_a_number(subtests: pytest.Subtests) -> None:
+    for preset, changes, field in DOUBTFUL:
+        with subtests.test(f"{preset!r:.60}"):
+            config = load_config(preset, changes)
+            assert [finding.severity for finding in check(config) if finding.field == field] == ["warning"]
+            assert any(re.search(r"\d", finding.instead) for finding in check(config) if finding.field == field)
+            assert any(sentence.startswith(f"{field} = ") for sentence in refuse_nonsense(config))
 
 
 STRANDS = "body.strands."
@@ -163,13 +161,12 @@ def test_the_presets_own_tolerance_lies_in_its_window() -> None:
     assert low_m < config.sensor.tolerance_m < high_m
 
 
-@pytest.mark.parametrize(("modulus_GPa", "friction", "damping_s", "lift_mm", "passing_mm"), MEASURED_WINDOWS)
-def test_the_window_of_tolerances_follows_what_was_measured(
-    modulus_GPa: float, friction: float, damping_s: float, lift_mm: float, passing_mm: float
-) -> None:
-    low_m, high_m = window_of(of_rods(modulus_GPa, friction, damping_s))
-    assert 1e3 * low_m == pytest.approx(lift_mm, abs=5.0)
-    assert 1e3 * high_m == pytest.approx(passing_mm, abs=4.0)
+def test_the_window_of_tolerances_follows_what_was_measured(subtests: pytest.Subtests) -> None:
+    for modulus_GPa, friction, damping_s, lift_mm, passing_mm in MEASURED_WINDOWS:
+        with subtests.test(f"{modulus_GPa!r:.60}"):
+            low_m, high_m = window_of(of_rods(modulus_GPa, friction, damping_s))
+            assert 1e3 * low_m == pytest.approx(lift_mm, abs=5.0)
+            assert 1e3 * high_m == pytest.approx(passing_mm, abs=4.0)
 
 
 @given(st.floats(0.3, 2.0), st.floats(1.0, 2.0), st.floats(0.05, 1.5), st.floats(1.0, 5.0), st.floats(0.05, 0.36))
@@ -222,17 +219,13 @@ def test_no_tolerance_is_suggested_where_none_is_known_to_do() -> None:
     assert "no tolerance is known" in finding.problem
 
 
-@pytest.mark.parametrize("name", ["riddle2023", "riddle2023-fast", "riddle2025", "riddle2025-muscles", "wang"])
-def test_bodies_that_were_not_measured_have_no_window(name: str) -> None:
-    assert tolerance_window_m(load_config(name)) is None
+def test_bodies_that_were_not_measured_have_no_window(subtests: pytest.Subtests) -> None:
+    for name in ("riddle2023", "riddle2023-fast", "riddle2025", "riddle2025-muscles", "wang"):
+        with subtests.test(f"{name!r:.60}"):
+            assert tolerance_window_m(load_config(name)) is None
 
 
 def test_a_ring_touches_where_its_strands_do() -> None:
     body = load_config("riddle2023-rods").body
     assert isinstance(body, WormBody)
     assert touching_ring_m(body) == pytest.approx(6 * 0.004)
-
-
-def test_it_is_public() -> None:
-    found = package.check(load_config("wang", {"body.mesh.radius_m": 0.05}))
-    assert isinstance(found[0], package.Finding)

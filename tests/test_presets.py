@@ -78,21 +78,40 @@ def value_at(preset: str, path: str) -> object:
     return value
 
 
-@pytest.mark.parametrize("preset", ["riddle2023", "riddle2023-rods"])
-@pytest.mark.parametrize("path", PUBLISHED)
-def test_the_robot_and_its_network_are_the_published_ones(preset: str, path: str) -> None:
-    assert value_at(preset, path) == PUBLISHED[path]
+NETWORK = {path: value for path, value in PUBLISHED.items() if path.startswith("controller.")}
+ROBOTS = {
+    "body.mesh.n_helices": 12,
+    "body.mesh.radius_m": 0.16,
+    "body.strands.radius_m": 0.00299,
+    "body.springs.sensors": "sides",
+    "body.rings.kind": "servo",
+    "body.rings.layout": "halves",
+    "body.springs.stiffness_N_per_m": 24.5,
+    "body.springs.rest_length_m": 0.065,
+}
+AUTHORS_SERVOS_AND_RODS = {
+    "body.strands.young_modulus_Pa": 2.0e9,
+    "body.strands.shear_modulus_Pa": 1.33e9,
+    "body.rings.length_range_m": (0.62, 0.96),
+    "body.rings.stiffness_N_per_m": 1000.0,
+    "body.rings.damping_Ns_per_m": 10.0,
+}
+ROBOTS_NETWORK = {path: value for path, value in NETWORK.items() if path != "controller.gate_time_constant_ms"}
+OF_PRESETS = {
+    "riddle2023": PUBLISHED | PAPER_S_FORMULATION,
+    "riddle2023-rods": PUBLISHED,
+    "daltorio2013": NETWORK,
+    "boxerbaum2012": NETWORK,
+    "riddle2022-planar": NETWORK | PLANAR,
+    "wang": ROBOTS,
+    "wang-network": ROBOTS_NETWORK,
+    "riddle2025": ROBOTS | AUTHORS_SERVOS_AND_RODS | ROBOTS_NETWORK,
+}
 
 
-@pytest.mark.parametrize("path", PAPER_S_FORMULATION)
-def test_the_paper_s_formulation_is_the_reconstruction(path: str) -> None:
-    assert value_at("riddle2023", path) == PAPER_S_FORMULATION[path]
-
-
-@pytest.mark.parametrize("preset", ["daltorio2013", "boxerbaum2012"])
-@pytest.mark.parametrize("path", [path for path in PUBLISHED if path.startswith("controller.")])
-def test_the_dynamic_planar_worms_have_the_published_network(preset: str, path: str) -> None:
-    assert value_at(preset, path) == PUBLISHED[path]
+def test_presets_have_the_published_numbers() -> None:
+    has = {name: {path: value_at(name, path) for path in numbers} for name, numbers in OF_PRESETS.items()}
+    assert has == OF_PRESETS
 
 
 @pytest.mark.parametrize("preset", ["daltorio2013", "boxerbaum2012"])
@@ -100,11 +119,6 @@ def test_the_dynamic_planar_worms_have_the_size_of_the_kinematic_one(preset: str
     assert value_at(preset, "body.side_m") == PLANAR["body.side_m"]
     assert value_at(preset, "body.height_relaxed_m") == PLANAR["body.height_max_m"]
     assert value_at(preset, "sensor.tolerance_m") == PAPER_S_FORMULATION["sensor.tolerance_m"]
-
-
-@pytest.mark.parametrize("path", [*PLANAR, *(path for path in PUBLISHED if path.startswith("controller."))])
-def test_the_planar_worm_is_the_published_one(path: str) -> None:
-    assert value_at("riddle2022-planar", path) == (PLANAR | PUBLISHED)[path]
 
 
 def test_the_peak_force_is_the_compiler_s_of_the_paper_s_time() -> None:
@@ -129,30 +143,6 @@ def test_the_chain_s_joints_damp_as_in_the_paper_s_files() -> None:
     element_m = float(np.linalg.norm(np.diff(mesh_of(body.mesh).vertices_m[0], axis=0), axis=1).max())
     joint = body.strands.damping_time_s * body.strands.bending_rigidity_Nm2 / element_m
     assert joint == pytest.approx(0.12, rel=1e-3)
-
-
-ROBOTS = {
-    "body.mesh.n_helices": 12,
-    "body.mesh.radius_m": 0.16,
-    "body.strands.radius_m": 0.00299,
-    "body.springs.sensors": "sides",
-    "body.rings.kind": "servo",
-    "body.rings.layout": "halves",
-    "body.springs.stiffness_N_per_m": 24.5,
-    "body.springs.rest_length_m": 0.065,
-}
-AUTHORS_SERVOS_AND_RODS = {
-    "body.strands.young_modulus_Pa": 2.0e9,
-    "body.strands.shear_modulus_Pa": 1.33e9,
-    "body.rings.length_range_m": (0.62, 0.96),
-    "body.rings.stiffness_N_per_m": 1000.0,
-    "body.rings.damping_Ns_per_m": 10.0,
-}
-
-
-@pytest.mark.parametrize("path", AUTHORS_SERVOS_AND_RODS)
-def test_the_six_segment_robot_has_the_authors_servos_and_rods(path: str) -> None:
-    assert value_at("riddle2025", path) == AUTHORS_SERVOS_AND_RODS[path]
 
 
 def test_the_four_segment_robot_is_isotropic_and_as_fast_as_measured() -> None:
@@ -213,12 +203,6 @@ def test_the_timed_patterns_are_those_of_the_authors_on_the_same_robot(
     }
 
 
-@pytest.mark.parametrize("preset", ["wang", "riddle2025"])
-@pytest.mark.parametrize("path", ROBOTS)
-def test_the_robots_have_the_authors_mesh_and_servos(preset: str, path: str) -> None:
-    assert value_at(preset, path) == ROBOTS[path]
-
-
 @pytest.mark.parametrize(
     ("preset", "n_segments", "n_crossings", "length_m"), [("wang", 4, 114, 0.71), ("riddle2025", 6, 120, 0.75)]
 )
@@ -240,11 +224,3 @@ def test_the_robots_have_the_authors_size_density_and_weight(
 def test_the_four_segment_robot_has_equal_servos() -> None:
     assert isinstance(value_at("wang", "body.rings.force_limit_N"), float)
     assert value_at("riddle2025", "body.rings.force_limit_N") == (16.0, 31.0, 31.0, 31.0, 31.0, 16.0)
-
-
-@pytest.mark.parametrize("preset", ["wang-network", "riddle2025"])
-@pytest.mark.parametrize(
-    "path", [p for p in PUBLISHED if p.startswith("controller.") and p != "controller.gate_time_constant_ms"]
-)
-def test_the_robots_have_the_published_network_but_for_its_speed(preset: str, path: str) -> None:
-    assert value_at(preset, path) == PUBLISHED[path]

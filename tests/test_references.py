@@ -42,23 +42,26 @@ def cited(source: str, changes: Mapping[str, Any] | None = None) -> set[str]:
     return set(references_of(load_config(source, changes)))
 
 
-@pytest.mark.parametrize("preset", preset_names())
-def test_every_preset_cites_its_source(preset: str) -> None:
-    expected = SOURCES.get(preset, {"riddle2025", "riddle2025models"})
-    assert expected | set(ALWAYS) <= cited(preset)
+def test_every_preset_cites_its_source(subtests: pytest.Subtests) -> None:
+    for preset in preset_names():
+        with subtests.test(f"{preset!r:.60}"):
+            expected = SOURCES.get(preset, {"riddle2025", "riddle2025models"})
+            assert expected | set(ALWAYS) <= cited(preset)
 
 
-@pytest.mark.parametrize("preset", preset_names())
-def test_every_preset_cites_its_controller_and_what_computes_it(preset: str) -> None:
-    config = load_config(preset)
-    keys = set(references_of(config))
-    assert CONTROLLERS[config.controller.kind] <= keys
-    assert ("todorov2012" in keys) != isinstance(config.body, PlanarWorm)
+def test_every_preset_cites_its_controller_and_what_computes_it(subtests: pytest.Subtests) -> None:
+    for preset in preset_names():
+        with subtests.test(f"{preset!r:.60}"):
+            config = load_config(preset)
+            keys = set(references_of(config))
+            assert CONTROLLERS[config.controller.kind] <= keys
+            assert ("todorov2012" in keys) != isinstance(config.body, PlanarWorm)
 
 
-@pytest.mark.parametrize("kind", CONTROLLERS)
-def test_every_kind_of_controller_adds_its_own(kind: str) -> None:
-    assert CONTROLLERS[kind] <= cited("riddle2023-rods", {"controller.kind": kind})
+def test_every_kind_of_controller_adds_its_own(subtests: pytest.Subtests) -> None:
+    for kind in CONTROLLERS:
+        with subtests.test(f"{kind!r:.60}"):
+            assert CONTROLLERS[kind] <= cited("riddle2023-rods", {"controller.kind": kind})
 
 
 def test_the_kinds_of_controllers_above_are_all_that_there_are() -> None:
@@ -108,13 +111,14 @@ def test_the_file_parses_and_every_entry_can_be_cited() -> None:
         assert "note" in fields or {"title", "year"} <= fields, entry.key
 
 
-@pytest.mark.parametrize("preset", preset_names())
-def test_what_is_printed_parses_with_its_reasons(preset: str) -> None:
-    references = references_of(load_config(preset))
-    library = parse_string(bibtex(references))
-    assert library.failed_blocks == []
-    assert [entry.key for entry in library.entries] == list(references)
-    assert all(references.values())
+def test_what_is_printed_parses_with_its_reasons(subtests: pytest.Subtests) -> None:
+    for preset in preset_names():
+        with subtests.test(f"{preset!r:.60}"):
+            references = references_of(load_config(preset))
+            library = parse_string(bibtex(references))
+            assert library.failed_blocks == []
+            assert [entry.key for entry in library.entries] == list(references)
+            assert all(references.values())
 
 
 def test_the_tool_is_cited_as_its_citation_file_says() -> None:

@@ -59,13 +59,14 @@ def test_not_a_number_is_written_too() -> None:
     assert math.isnan(parse_toml(toml_text({"x": math.nan}), "it")["x"])
 
 
-@pytest.mark.parametrize("name", preset_names())
-def test_a_configuration_is_loaded_as_it_was_written(name: str) -> None:
-    config = load_config(name, {"name": "🪱 of mine", "summary": 'a "b" \\'})
-    assert load_config(parse_toml(toml_text(config.model_dump()), "it")) == config
-    fields = {"body": config.body, "controller": config.controller, "duration_s": config.duration_s}
-    words = [f"{path}={toml_value(value)}" for path, value in fields.items()]
-    assert load_config(name, parse_assignments(words)) == load_config(name)
+def test_a_configuration_is_loaded_as_it_was_written(subtests: pytest.Subtests) -> None:
+    for name in preset_names():
+        with subtests.test(f"{name!r:.60}"):
+            config = load_config(name, {"name": "🪱 of mine", "summary": 'a "b" \\'})
+            assert load_config(parse_toml(toml_text(config.model_dump()), "it")) == config
+            fields = {"body": config.body, "controller": config.controller, "duration_s": config.duration_s}
+            words = [f"{path}={toml_value(value)}" for path, value in fields.items()]
+            assert load_config(name, parse_assignments(words)) == load_config(name)
 
 
 neurons = st.builds(

@@ -20,12 +20,6 @@ NUMBERS = st.floats(-1e6, 1e6).filter(lambda x: x == 0 or abs(x) > 1e-6)
 
 
 @pytest.fixture(scope="module")
-def planar(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    config = load_config("riddle2022-planar", {"duration_s": 1.0})
-    return simulate(config, tmp_path_factory.mktemp("one") / "planar", progress=False)
-
-
-@pytest.fixture(scope="module")
 def rods(tmp_path_factory: pytest.TempPathFactory) -> Run:
     config = load_config("riddle2023-rods", {"duration_s": 0.1, "body.mesh.n_segments": 4})
     return simulate(config, tmp_path_factory.mktemp("two") / "rods", progress=False)
@@ -55,10 +49,10 @@ def test_what_cannot_be_compared_is_none(first: float | list[float] | None, othe
     assert relative_difference(first, other) is None
 
 
-def test_worms_of_different_kinds_stand_side_by_side(planar: Run, rods: Run) -> None:
-    both = compare([planar, rods])
+def test_worms_of_different_kinds_stand_side_by_side(planar_run: Run, rods: Run) -> None:
+    both = compare([planar_run, rods])
     assert both.labels == ("planar", "rods")
-    assert both.numbers["ring_length_min_m"] == tuple(summary(run).ring_length_min_m for run in (planar, rods))
+    assert both.numbers["ring_length_min_m"] == tuple(summary(run).ring_length_min_m for run in (planar_run, rods))
     assert both.numbers["pin_gap_max_m"] == (None, None)
     assert both.numbers["travel_m"] == (None, summary(rods).travel_m)
     energy = gait(rods).energy
@@ -73,8 +67,8 @@ def test_worms_of_different_kinds_stand_side_by_side(planar: Run, rods: Run) -> 
     assert written["arena.friction"] == [None, 1.0]
 
 
-def test_a_run_differs_from_itself_in_nothing(planar: Run) -> None:
-    twice = compare([planar, planar])
+def test_a_run_differs_from_itself_in_nothing(planar_run: Run) -> None:
+    twice = compare([planar_run, planar_run])
     assert twice.fields == {}
     for field, values in twice.numbers.items():
         assert values[0] == values[1]
@@ -90,9 +84,9 @@ def test_exactly_the_fields_that_were_changed_differ() -> None:
     assert fields["arena.friction"] == (1.0, 0.3, 1.0)
 
 
-def test_labels_are_as_much_of_the_paths_as_tells_them_apart(planar: Run) -> None:
+def test_labels_are_as_much_of_the_paths_as_tells_them_apart(planar_run: Run) -> None:
     def at(*paths: str) -> list[Run]:
-        return [replace(planar, path=Path(path) / "run.nc") for path in paths]
+        return [replace(planar_run, path=Path(path) / "run.nc") for path in paths]
 
     assert run_labels(at("/a/one", "/a/two")) == ("one", "two")
     assert run_labels(at("/a/one", "/b/one")) == ("a/one", "b/one")

@@ -19,13 +19,6 @@ def test_deficits_of_the_published_elongations() -> None:
     assert end_difference(robot) == pytest.approx(0.0275, abs=2e-3)
 
 
-@given(st.lists(st.floats(1e-3, 1.0), min_size=3, max_size=12), st.floats(0.1, 10.0))
-def test_deficits_do_not_depend_on_the_unit(lengths: list[float], factor: float) -> None:
-    scaled = [factor * length for length in lengths]
-    assert middle_deficit(scaled) == pytest.approx(middle_deficit(lengths), abs=1e-9)
-    assert end_difference(scaled) == pytest.approx(end_difference(lengths), abs=1e-9)
-
-
 def test_deficits_of_a_worm_that_does_not_elongate_cannot_be_told() -> None:
     assert math.isnan(middle_deficit([0.0, 0.01, 0.0]))
     assert math.isnan(end_difference([0.0, 0.01, 0.0]))

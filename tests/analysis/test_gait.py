@@ -14,7 +14,6 @@ import xarray as xr
 from hypothesis import given
 from hypothesis import strategies as st
 
-import annelid
 from annelid.analysis import Gait, gait
 from annelid.analysis.track import fitted_circle
 from annelid.config import check_config
@@ -144,16 +143,6 @@ def test_a_circle_is_found_wherever_its_arc_lies(
     assert circle.signed_radius_m == pytest.approx(turn * radius, rel=1e-5)
 
 
-def test_a_noisy_arc_s_radius_is_not_drawn_in() -> None:
-    generator = np.random.default_rng(3)
-    along = np.linspace(0.0, 0.8, 400)
-    points = 3.0 * np.stack([np.cos(along), np.sin(along)], axis=-1) + generator.normal(0.0, 0.02, (400, 2))
-    circle = fitted_circle(points)
-    assert circle is not None
-    assert circle.radius_m == pytest.approx(3.0, rel=0.05)
-    assert circle.off_m == pytest.approx(0.02, rel=0.1)
-
-
 @pytest.mark.parametrize("points", [[[0, 0], [1, 1]], [[0, 0], [1, 1], [2, 2], [3, 3]], [[1, 1]] * 5])
 def test_points_without_a_circle_have_none(points: list[list[float]]) -> None:
     assert fitted_circle(points) is None
@@ -217,7 +206,3 @@ def test_numbers_are_none_and_never_nan() -> None:
     text = json.dumps(read.to_dict(), allow_nan=False)
     assert set(json.loads(text)) == {field.name for field in fields(Gait)}
     assert not any(isinstance(value, float) and math.isnan(value) for value in read.to_dict().values())
-
-
-def test_the_gait_is_public() -> None:
-    assert annelid.gait is gait

@@ -45,17 +45,6 @@ def test_a_stretch_and_a_squeeze_change_one_diagonal_each(mesh: MeshGeometry) ->
     np.testing.assert_allclose(squeezed.lateral, -0.5)
 
 
-def test_a_shear_tilts_the_lateral_diagonals_only(mesh: MeshGeometry) -> None:
-    sheared = mesh.crossings_m.copy()
-    sheared[:, 0] += 0.7 * sheared[:, 1]
-    change = deformation(sheared, mesh)
-    _, left, _, right = mesh.rhombi.T
-    across = mesh.crossings_m[right] - mesh.crossings_m[left]
-    expected = np.sqrt(1.0 + (0.7 * across[:, 1]) ** 2 / (across**2).sum(axis=1)) - 1.0
-    np.testing.assert_allclose(change.axial, 0.0, atol=1e-12)
-    np.testing.assert_allclose(change.lateral, expected, atol=1e-12)
-
-
 def test_a_turn_and_a_shift_deform_nothing(mesh: MeshGeometry) -> None:
     c, s = np.cos(0.4), np.sin(0.4)
     moved = mesh.crossings_m @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1.0]]) + [0.3, -0.2, 0.1]

@@ -64,38 +64,41 @@ def gradient(arena: ArenaKind, points: Array, step: float = 1e-6) -> Array:
     return np.stack(ends, axis=-1) / (2 * step)
 
 
-@pytest.mark.parametrize("arena", ARENAS.values(), ids=ARENAS)
-def test_the_normal_is_the_gradient_of_the_distance_and_has_unit_length(arena: ArenaKind) -> None:
-    points = places(arena)
-    normal, numerical = surface_of(arena).normal(points), gradient(arena, points)
-    assert np.linalg.norm(normal, axis=-1) == pytest.approx(1.0, abs=1e-12)
-    kinked = np.abs(np.linalg.norm(numerical, axis=-1) - 1.0) > 1e-6
-    assert kinked.mean() <= most_kinked(arena)
-    assert np.abs(normal - numerical)[~kinked].max() < 1e-6
+def test_the_normal_is_the_gradient_of_the_distance_and_has_unit_length(subtests: pytest.Subtests) -> None:
+    for arena in ARENAS.values():
+        with subtests.test(f"{arena!r:.60}"):
+            points = places(arena)
+            normal, numerical = surface_of(arena).normal(points), gradient(arena, points)
+            assert np.linalg.norm(normal, axis=-1) == pytest.approx(1.0, abs=1e-12)
+            kinked = np.abs(np.linalg.norm(numerical, axis=-1) - 1.0) > 1e-6
+            assert kinked.mean() <= most_kinked(arena)
+            assert np.abs(normal - numerical)[~kinked].max() < 1e-6
 
 
-@pytest.mark.parametrize("arena", ARENAS.values(), ids=ARENAS)
-def test_a_point_of_the_surface_has_no_distance_and_its_normal_leads_away(arena: ArenaKind) -> None:
-    surface, points = surface_of(arena), places(arena, seed=1)
-    feet = points - surface.distance_m(points)[:, None] * surface.normal(points)
-    on_it = np.abs(surface.distance_m(feet)) < 1e-9
-    assert on_it.mean() >= 1.0 - most_kinked(arena)
-    lifted = surface.distance_m(feet[on_it] + 1e-3 * surface.normal(feet[on_it]))
-    assert np.abs(lifted - 1e-3).max() < 1e-8
+def test_a_point_of_the_surface_has_no_distance_and_its_normal_leads_away(subtests: pytest.Subtests) -> None:
+    for arena in ARENAS.values():
+        with subtests.test(f"{arena!r:.60}"):
+            surface, points = surface_of(arena), places(arena, seed=1)
+            feet = points - surface.distance_m(points)[:, None] * surface.normal(points)
+            on_it = np.abs(surface.distance_m(feet)) < 1e-9
+            assert on_it.mean() >= 1.0 - most_kinked(arena)
+            lifted = surface.distance_m(feet[on_it] + 1e-3 * surface.normal(feet[on_it]))
+            assert np.abs(lifted - 1e-3).max() < 1e-8
 
 
-@pytest.mark.parametrize("arena", ARENAS.values(), ids=ARENAS)
-def test_no_point_of_the_surface_is_nearer_than_the_distance(arena: ArenaKind) -> None:
+def test_no_point_of_the_surface_is_nearer_than_the_distance(subtests: pytest.Subtests) -> None:
     """Against the definition: the least distance to a dense sample of the surface itself."""
-    surface, points = surface_of(arena), places(arena, seed=2, n=30)
-    distance = surface.distance_m(points)
-    feet = points - distance[:, None] * surface.normal(points)
-    rng = np.random.default_rng(3)
-    for point, foot, own in zip(points, feet, np.abs(distance), strict=True):
-        around = foot + rng.uniform(-0.03, 0.03, (200, 3))
-        on_it = around - surface.distance_m(around)[:, None] * surface.normal(around)
-        on_it = on_it[np.abs(surface.distance_m(on_it)) < 1e-9]
-        assert np.linalg.norm(on_it - point, axis=-1).min() > own - 1e-9
+    for arena in ARENAS.values():
+        with subtests.test(f"{arena!r:.60}"):
+            surface, points = surface_of(arena), places(arena, seed=2, n=30)
+            distance = surface.distance_m(points)
+            feet = points - distance[:, None] * surface.normal(points)
+            rng = np.random.default_rng(3)
+            for point, foot, own in zip(points, feet, np.abs(distance), strict=True):
+                around = foot + rng.uniform(-0.03, 0.03, (200, 3))
+                on_it = around - surface.distance_m(around)[:, None] * surface.normal(around)
+                on_it = on_it[np.abs(surface.distance_m(on_it)) < 1e-9]
+                assert np.linalg.norm(on_it - point, axis=-1).min() > own - 1e-9
 
 
 @given(st.floats(0.1, 1.3), st.floats(0.0, 2 * pi), st.floats(0.0, pi / 2), st.floats(0.0, 0.09))

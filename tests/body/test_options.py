@@ -48,7 +48,8 @@ def damping_over_stiffness(model: mujoco.MjModel) -> set[float]:
     return set(np.round(damping / stiffness, 12))
 
 
-BOTH: list[tuple[dict[str, Any], Read, Any]] = [
+Case = tuple[dict[str, Any], Read, Any]
+BOTH: list[Case] = [
     ({"clock.physics_timestep_s": 0.004}, lambda m: m.opt.timestep, 0.004),
     ({"arena.gravity_m_per_s2": 1.62}, lambda m: m.opt.gravity.tolist(), [0, 0, -1.62]),
     ({"arena.friction": 0.37}, lambda m: set(m.geom_friction[[*touching(m), m.geom("floor").id], 0]), {0.37}),
@@ -82,7 +83,7 @@ BOTH: list[tuple[dict[str, Any], Read, Any]] = [
     ({"body.rings.activation_dynamics": True}, lambda m: m.na, 3),
     ({"body.pins.radius_m": 0.007}, lambda m: m.geom("crossing_5").size[0], 0.007),
 ]
-RODS: list[tuple[dict[str, Any], Read, Any]] = [
+RODS: list[Case] = [
     (
         {},
         lambda m: (m.opt.integrator, m.opt.solver, m.opt.cone),
@@ -95,7 +96,7 @@ RODS: list[tuple[dict[str, Any], Read, Any]] = [
     ({"body.mesh.elements_per_end": 1}, lambda m: set(m.flex_elemnum), {14 * 3 + 2}),
     ({"body.strands.damping_time_s": 0.2}, lambda m: set(m.flex_damping), {0.2}),
 ]
-CHAINS: list[tuple[dict[str, Any], Read, Any]] = [
+CHAINS: list[Case] = [
     (
         {},
         lambda m: (m.opt.integrator, m.opt.solver, m.opt.cone, m.opt.iterations),
@@ -125,26 +126,15 @@ def assert_read(changes: dict[str, Any], read: Read, expected: Any) -> None:
     assert flat_actual == pytest.approx(flat_expected, rel=1e-9)
 
 
-def name_of(case: tuple[dict[str, Any], Read, Any]) -> str:
-    return ", ".join(f"{key.split('.')[-1]}={value}" for key, value in case[0].items()) or "defaults"
-
-
-@pytest.mark.parametrize("case", BOTH, ids=name_of)
-@pytest.mark.parametrize("formulation", [{}, CHAIN], ids=["rods", "chain"])
-def test_an_option_of_both_formulations_reaches_the_engine(formulation: dict[str, Any], case: Any) -> None:
-    changes, read, expected = case
-    assert_read({**COARSE, **formulation, **changes}, read, expected)
-
-
-@pytest.mark.parametrize("case", RODS, ids=name_of)
-def test_an_option_of_the_rods_reaches_the_engine(case: Any) -> None:
-    assert_read(*case)
-
-
-@pytest.mark.parametrize("case", CHAINS, ids=name_of)
-def test_an_option_of_the_chain_reaches_the_engine(case: Any) -> None:
-    changes, read, expected = case
-    assert_read({**CHAIN, **changes}, read, expected)
+@pytest.mark.parametrize(
+    ("base", "cases"),
+    [(COARSE, BOTH), (COARSE | CHAIN, BOTH), ({}, RODS), (CHAIN, CHAINS)],
+    ids=["both as rods", "both as chain", "rods", "chain"],
+)
+def test_an_option_reaches_the_engine(base: dict[str, Any], cases: list[Case], subtests: pytest.Subtests) -> None:
+    for changes, read, expected in cases:
+        with subtests.test(**changes):
+            assert_read({**base, **changes}, read, expected)
 
 
 def test_the_chain_s_joints_resist_with_the_rod_s_stiffness_over_their_length() -> None:

@@ -335,7 +335,7 @@ def test_a_cantilever_rings_down_as_rod_theory_says(formulation: Formulation, ca
     assert abs(errors[1]) < 0.05
 
 
-@pytest.mark.parametrize("case", CASES, ids=str)
+@pytest.mark.parametrize("case", [case for case in CASES if case.shape == "helix"], ids=str)
 def test_a_cantilever_of_rods_does_so_at_steps_that_would_double_its_damping_otherwise(case: Case) -> None:
     errors = Ring("rods", case, 8).down(LONG_STEP / case.frequency())
     assert errors is not None

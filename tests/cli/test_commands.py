@@ -95,10 +95,6 @@ def test_show_json_is_json_and_nothing_else(annelid: Command, finished: Path) ->
     assert read["travel_m"] is None
 
 
-def test_show_prints_the_published_period_beside_ours(annelid: Command, finished: Path) -> None:
-    assert "2.625 s" in annelid("show", finished / "run.nc").out
-
-
 def test_plot_and_render_write_where_they_are_told(annelid: Command, finished: Path) -> None:
     assert annelid("draw", finished, "-o", "f.svg").exit_code == 0
     assert Path("f.svg").read_text().lstrip().startswith("<?xml")
@@ -141,7 +137,6 @@ def test_a_network_file_is_exported_and_kept_without_force(annelid: Command) -> 
 
 
 def test_build_writes_what_plain_mujoco_loads_and_steps(annelid: Command) -> None:
-    import mujoco
     import numpy as np
 
     done = annelid("export", "--to", "mjcf", "riddle2023-rods", "-o", "worm.xml", "--segments", "4")
@@ -199,16 +194,6 @@ def test_doctor_ends_well(annelid: Command) -> None:
     assert any(line.split()[:2] == ["ok", "mujoco"] for line in done.out.splitlines())
 
 
-def test_lists_are_printed_as_json(annelid: Command) -> None:
-    presets = {each["name"]: each for each in json.loads(annelid("list", "presets", "--json").out)}
-    assert set(presets) == set(preset_names())
-    assert presets["riddle2023-fast"]["n_segments"] == 3
-    assert "pipe.bend" in {each["name"] for each in json.loads(annelid("list", "arenas", "--json").out)}
-    assert {"item": "annelid", "ok": True}.items() <= json.loads(annelid("doctor", "--json").out)[0].items()
-    for wrong in (("list", "presets", "wang"), ("list", "arenas", "floor"), ("doctor", "--report")):
-        assert annelid(*wrong, "--json").exit_code == 2
-
-
 def test_every_command_teaches_by_example(annelid: Command) -> None:
     def commands(group: Any, *above: str) -> Iterator[tuple[str, ...]]:
         for name, one in group.commands.items():
@@ -254,8 +239,8 @@ def test_every_option_with_a_unit_says_it() -> None:
         assert unit.search(option.help), option.opts
 
 
-@pytest.mark.parametrize(("typed", "offers"), [("annelid ru", "run"), ("annelid run --fid", "--fidelity")])
-def test_the_shell_completes_commands_and_options(typed: str, offers: str) -> None:
+def test_the_shell_completes_options() -> None:
+    typed, offers = "annelid run --fid", "--fidelity"
     asked = {"COMP_WORDS": typed, "COMP_CWORD": str(typed.count(" ")), "_ANNELID_COMPLETE": "complete_bash"}
     name = Path(sys.executable).with_name("annelid")
     done = subprocess.run([name], env={**os.environ, **asked}, capture_output=True, text=True, check=False)
@@ -282,19 +267,6 @@ def test_arenas_are_listed_printed_built_and_walked_in(annelid: Command) -> None
     assert isinstance(arena, Pipe)
     assert (arena.course, arena.radius_m) == ("bend", 0.5)
     assert annelid("run", "--resume", "bent", "--arena", "floor").exit_code == 2
-
-
-def test_a_worm_in_a_pipe_is_written_with_walls_that_stand_still(annelid: Command) -> None:
-    assert (
-        annelid("export", "--to", "mjcf", "riddle2023-rods", "--arena", "pipe.taper", "-o", "piped.xml").exit_code == 0
-    )
-    model = mujoco.MjModel.from_xml_path("piped.xml")
-    data = mujoco.MjData(model)
-    for _ in range(100):
-        mujoco.mj_step(model, data)
-    assert model.nmocap == 0
-    assert data.ncon > 3
-    assert data.body("crossing_0").xpos[2] > -0.01
 
 
 def test_friction_that_depends_on_the_direction_is_not_written_as_another(annelid: Command) -> None:

@@ -143,7 +143,6 @@ def faked(name: str) -> Callable[[Command, Path, pytest.MonkeyPatch], Outcome]:
 
 
 def loop(annelid: Command, _: Path, monkeypatch: pytest.MonkeyPatch) -> Outcome:
-    pytest.importorskip("serial")
     with pseudo_robot(PseudoRobot(3, 3)) as path:
         # Busy tests beside it must not end it.
         quick = ("--duration", "0.2", "--rate", "20", "--watchdog", "40")

@@ -17,31 +17,6 @@ RODS = "riddle2023-rods"
 TINY = ("--duration", "0.1", "--no-video", "--jobs", "1")
 
 
-@pytest.mark.slow
-@pytest.mark.usefixtures("undrawn")
-def test_a_run_with_error_bars_leaves_all_its_files_and_goes_on(annelid: Command) -> None:
-    command = ("run", RODS, "--uncertainty", "2", "--set", "body.joints.dry_friction_Nm=0.0083", *TINY, "-o", "walk")
-    done = annelid(*command)
-    assert done.exit_code == 0, done.err
-    assert "Monte Carlo samples kept an ordered rhythm" in done.out
-    assert "+-" in done.out
-    printed = [Path(line).name for line in done.out.splitlines() if line.startswith("walk")]
-    assert printed[:4] == ["run.nc", "uncertainty.json", "uncertainty.csv", "uncertainty.png"]
-    assert all(Path("walk", name).exists() for name in printed)
-    assert open_run("walk").config.duration_s == 0.1
-    content = json.loads(Path("walk/uncertainty.json").read_text())
-    assert list(content["varied"]) == ["young_modulus", "dry_friction", "cable_friction"]
-    assert [run["kind"] for run in content["list", "runs"]].count("drawn") == 2
-
-    before = {path: path.stat().st_mtime_ns for path in Path("walk/uncertainty").glob("*/run.nc")}
-    assert len(before) == 7
-    again = annelid(*command, "-q")
-    assert again.exit_code == 0, again.err
-    assert {path: path.stat().st_mtime_ns for path in Path("walk/uncertainty").glob("*/run.nc")} == before
-    assert json.loads(Path("walk/uncertainty.json").read_text()) == content
-    assert "has another run in it" in annelid(*command, "--seed", "3").sentence()
-
-
 def test_an_interrupted_study_names_the_command_that_goes_on(annelid: Command, monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[dict[str, Any]] = []
 

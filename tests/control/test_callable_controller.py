@@ -35,9 +35,8 @@ def test_reset_reaches_the_function():
     assert seeds == [7]
 
 
-@pytest.mark.parametrize(
-    ("result", "message"),
-    [
+def test_anything_else_is_refused_in_one_sentence(subtests: pytest.Subtests) -> None:
+    for result, message in (
         ([0.1, 0.2], r"shape \(2,\) at 0.25 s; it must return shape \(3,\)"),
         ([0.1, 1.2, 0.3], "activation 1.2 for muscle 2"),
         ([0.1, 0.2, -0.3], "activation -0.3 for muscle 3"),
@@ -45,8 +44,6 @@ def test_reset_reaches_the_function():
         (None, "activation nan for muscle 1"),
         ("half", "returned str"),
         ([[0.1], [0.2, 0.3]], "returned list"),
-    ],
-)
-def test_anything_else_is_refused_in_one_sentence(result, message):
-    with pytest.raises(ConfigError, match=message):
-        CallableController(lambda s: result, n_muscles=3).step(FELT)
+    ):
+        with subtests.test(f"{result!r:.60}"), pytest.raises(ConfigError, match=message):
+            CallableController(lambda s, result=result: result, n_muscles=3).step(FELT)  # type: ignore[arg-type]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from dataclasses import replace
 from itertools import permutations
 from pathlib import Path
@@ -135,23 +134,3 @@ def test_a_run_goes_on_bit_for_bit_and_its_network_can_be_drawn(tmp_path: Path) 
     from annelid.draw.figures.network_diagram import run_network_figure
 
     assert run_network_figure(whole, tmp_path / "network.png").stat().st_size > 1000
-
-
-@pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler called cc")
-@pytest.mark.parametrize("slope", [None, 0.3])
-def test_it_is_the_same_in_c(slope: float | None, tmp_path: Path) -> None:
-    from annelid_lab.firmware import HostFirmware, controller_firmware
-
-    inputs = {
-        "stretch of segment1": Sense("lengthening_m", 0, gain=400.0),
-        "stretch of segment2": Sense("touch_N", (2, 1), gain=0.3, threshold=2.0, most_nA=1.5),
-        "stretch of segment3": 2.5,
-    }
-    ours = NetworkController(baton(), inputs, NAMES, n_muscles=2 * N, slope_per_mV=slope)
-    code = HostFirmware(controller_firmware(ours, "baton"), tmp_path)
-    rng = np.random.default_rng(0)
-    for step in range(500):
-        now = sensed(rng.uniform(-0.02, 0.06, N), step)
-        assert code.step(now) == pytest.approx(ours.step(now), abs=1e-12)
-    with pytest.raises(ConfigError, match="is set by a function of Python"):
-        controller_firmware(NetworkController(baton(), {"stretch of segment1": lambda s: s.time_s}, NAMES))

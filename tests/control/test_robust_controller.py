@@ -17,8 +17,7 @@ from annelid.config import RunConfig
 from annelid.control.robust import DescendingDrive, RobustController, RobustSns
 from annelid.errors import ConfigError
 from annelid.nervous.robust import ROLES, robust_network
-from annelid.protocols import SIDES, Records, Sensation, Stateful, StridingController
-from annelid.simulation.stepping import build_controller, build_plant
+from annelid.protocols import SIDES, Sensation
 
 N, TIMESTEP_S, REST_M = 4, 0.001, 0.1
 
@@ -35,19 +34,6 @@ def controller(n_muscles: int = N, full_stretch_m: float = 0.08) -> RobustContro
 
 def planar(**changes: object) -> RunConfig:
     return load_config("riddle2022-planar", {"controller": {"kind": "sns-robust"}, **changes})
-
-
-def test_it_has_the_capabilities() -> None:
-    made = controller()
-    assert isinstance(made, Records)
-    assert isinstance(made, Stateful)
-    assert isinstance(made, StridingController)
-
-
-def test_a_configuration_builds_it() -> None:
-    config = planar()
-    made = build_controller(config, build_plant(config))
-    assert isinstance(made, RobustController)
 
 
 def test_a_stride_is_its_steps_bit_for_bit() -> None:
@@ -92,9 +78,9 @@ def test_it_starts_as_it_is_told() -> None:
     assert drawn[0].max() <= 60.0
 
 
-@pytest.mark.parametrize("start", ["silent", "random"])
-def test_it_walks_from_any_start_after_two_turns(start: str, tmp_path: Path) -> None:
-    run = simulate(planar(controller={"kind": "sns-robust", "start": start}, duration_s=8.5), tmp_path, progress=False)
+def test_it_walks_from_a_random_start_after_two_turns(tmp_path: Path) -> None:
+    section = {"kind": "sns-robust", "start": "random"}
+    run = simulate(planar(controller=section, duration_s=8.5), tmp_path, progress=False)
     score = rhythm_score(open_run(run.path), 1.75)
     assert (score.verdict, score.direction, score.wave_fronts) == ("ordered", 1, 1)
 
@@ -110,16 +96,8 @@ def test_what_it_names_it_reads() -> None:
     assert made.read(frame=True) == {}
 
 
-def test_one_segment_is_contracted_at_the_start_and_half_rings_are_alike() -> None:
-    activation = controller(n_muscles=2 * N).stride(sensation(np.zeros(N)), 100)[-1].reshape(N, 2)
-    assert np.array_equal(activation[:, 0], activation[:, 1])
-    assert activation[0, 0] > 0.99
-    assert activation[1:].max() < 0.01
-
-
-@pytest.mark.parametrize("n", [3, 6])
-def test_it_walks_the_planar_worm(n: int, tmp_path: Path) -> None:
-    period_s = n * 0.875
+def test_it_walks_the_planar_worm(tmp_path: Path) -> None:
+    n, period_s = 6, 6 * 0.875
     simulate(planar(**{"body.n_segments": n, "duration_s": 2.6 * period_s}), tmp_path / "run", progress=False)
     found = rhythm_score(open_run(tmp_path / "run"))
     assert found.verdict == "ordered"
@@ -132,12 +110,10 @@ def test_a_control_step_that_is_too_long_is_refused() -> None:
         RobustController(RobustSns(), 24, 24, 0.005)
 
 
-@pytest.mark.parametrize(
-    ("field", "value"), [("turn_ms", 0), ("bifurcation_mV", 0.01), ("entrainment", 0.2), ("full_stretch_m", -1)]
-)
-def test_bad_fields_are_refused(field: str, value: float) -> None:
-    with pytest.raises(ConfigError, match=field):
-        planar(**{f"controller.{field}": value})
+def test_bad_fields_are_refused(subtests: pytest.Subtests) -> None:
+    for field, value in (("turn_ms", 0), ("bifurcation_mV", 0.01), ("entrainment", 0.2), ("full_stretch_m", -1)):
+        with subtests.test(f"{field!r:.60}"), pytest.raises(ConfigError, match=field):
+            planar(**{f"controller.{field}": value})
 
 
 def pressed(touch_N: np.ndarray) -> Sensation:
@@ -201,18 +177,3 @@ def test_motor_neurons_let_go_with_their_time_constant() -> None:
     later = own[end : end + 200]
     assert later[1:] / later[:-1] == pytest.approx(np.full(199, 1.0 - 0.001 / 0.35), rel=1e-9)
     assert later[0] > 0.8
-
-
-def test_motor_neurons_outlast_turns_but_do_not_change_them() -> None:
-    section = RobustSns(turn_ms=300.0, let_go_s=0.35, descending=DescendingDrive(lift=0.45))
-    made, plain = RobustController(section, N, 2 * N, TIMESTEP_S), driven()
-    touch = np.full((N, len(SIDES)), 1.0)
-    for _ in range(20):
-        activation = made.stride(pressed(touch), 50)
-        plain.stride(pressed(touch), 50)
-        assert np.array_equal(activation[:, ::2], activation[:, 1::2])
-        assert activation.min() >= 0.0
-        assert activation.max() <= 1.0
-    roles = slice(0, N * len(ROLES))
-    own, other = (np.asarray(one.read(frame=False)["potential"])[roles] for one in (made, plain))
-    assert own == pytest.approx(other, abs=1e-6)

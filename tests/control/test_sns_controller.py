@@ -12,7 +12,7 @@ from annelid.control import CopySettings, SnsController
 from annelid.control.sns import Sns
 from annelid.errors import ConfigError
 from annelid.nervous import neuron_names
-from annelid.protocols import Controller, Records, Sensation, Stateful, StridingController, Watched
+from annelid.protocols import Sensation, StridingController
 
 REST_M = 0.07
 
@@ -40,13 +40,6 @@ OFF = 0.02
 
 def potential(one: SnsController) -> dict[str, float]:
     return dict(zip(neuron_names(3), np.asarray(one.read(frame=False)["potential"]), strict=True))
-
-
-def test_is_a_controller_that_records_and_restores():
-    one: Controller = controller()
-    assert isinstance(one, Records)
-    assert isinstance(one, Stateful)
-    assert isinstance(one, Watched)
 
 
 def test_the_kick_acts_on_the_first_contraction_neuron_in_the_first_step_only():

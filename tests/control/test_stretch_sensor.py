@@ -42,14 +42,6 @@ def test_on_while_the_mean_is_within_the_tolerance(excess_m):
     assert np.array_equal(on[clear], (mean <= 0.01)[clear])
 
 
-@given(excess_m=excesses, swap=st.permutations(range(6)))
-def test_which_spring_is_long_does_not_matter(excess_m, swap):
-    stretch = REST_M + np.array(excess_m)
-    margin = np.abs((stretch - REST_M).mean(axis=1) - 0.01) > 1e-12
-    straight = sensor().read(stretch, REST_M, 5.0)
-    assert np.array_equal(straight[margin], sensor().read(stretch[:, swap], REST_M, 5.0)[margin])
-
-
 def test_each_segment_has_its_own_rest_length():
     rest = np.array([[0.07], [0.08], [0.09]])
     on = sensor().read(np.full((3, 1), 0.085), rest, 1.0)
@@ -108,43 +100,6 @@ def test_reset_forgets():
     assert sweep(one, [0.012]) == [False]
 
 
-def test_the_reading_is_the_callers_to_keep():
-    one = sensor()
-    reading = one.read(REST_M, REST_M, 1.0)
-    reading[:] = False
-    assert one.on.all()
-
-
 def test_no_segments_are_refused():
     with pytest.raises(ConfigError, match="n_segments"):
         sensor(n_segments=0)
-
-
-@given(
-    n_worms=st.integers(1, 6),
-    n_sensors=st.integers(1, 20),
-    time_s=st.sampled_from([0.0, 0.1, 0.2, 5.0]),
-    axes=st.permutations(range(3)),
-    seed=st.integers(0, 999),
-)
-def test_worms_with_tolerances_of_their_own_are_read_as_alone(n_worms, n_sensors, time_s, axes, seed):
-    rng = np.random.default_rng(seed)
-    rest = rng.uniform(0.06, 0.08, (3, n_sensors))
-    tolerance, hysteresis = rng.uniform(0, 0.02, n_worms), rng.uniform(0, 0.01, n_worms)
-    before = rng.random((n_worms, 3)) < 0.5
-    shape = np.array([n_worms, 3, n_sensors])
-    # Some memory layout: the bits of a mean must not depend on it.
-    lengths = np.empty(shape[list(axes)]).transpose(np.argsort(axes))
-    lengths[...] = rest + rng.uniform(-0.01, 0.03, shape)
-    longer = lengthening_m(lengths, rest)[np.newaxis]
-    (together,) = sensor(9.9, startup_hold_s=0.2).readings(
-        before, longer, [time_s], tolerance[:, np.newaxis], hysteresis[:, np.newaxis]
-    )
-    for worm in range(n_worms):
-        alone = sensor(tolerance[worm], hysteresis[worm], startup_hold_s=0.2)
-        alone.on[:] = before[worm]
-        stretch = np.array(lengths[worm], order="C")
-        assert np.array_equal(together[worm], alone.read(stretch, rest, time_s))
-        # A worm that sits right on its threshold finds any other order of the sum.
-        mean = (stretch - rest).sum(axis=-1) / n_sensors
-        assert sensor(9.9).readings(before[worm], longer[:, worm], [time_s], mean, 0.0).all()

@@ -209,13 +209,11 @@ def check_program(command: Command) -> None:
         assert all(f'"{word}"' in source for word in words if word.startswith("--")), command
 
 
-@pytest.mark.parametrize("page", PAGES)
-def test_every_command_is_understood(page: str) -> None:
-    for command in commands_of(page):
-        if command.words[0] == "annelid":
-            check_annelid(command)
-        else:
-            check_program(command)
+def test_every_command_is_understood(subtests: pytest.Subtests) -> None:
+    for page in PAGES:
+        for command in commands_of(page):
+            with subtests.test(page=page, command=str(command)):
+                (check_annelid if command.words[0] == "annelid" else check_program)(command)
 
 
 def test_an_unknown_option_field_or_preset_is_found() -> None:

@@ -41,15 +41,16 @@ def test_the_gallery_shows_the_commands_of_the_list() -> None:
         assert first == words_of(pictures()[name].command), f"{GALLERY}: the command of {name} differs from the list"
 
 
-@pytest.mark.parametrize("name", pictures())
-def test_a_picture_can_be_made_as_the_list_says(name: str) -> None:
-    one = pictures()[name]
-    command = words_of(one.command)
-    (check_annelid if command.words[0] == "annelid" else check_program)(command)
-    assert one.maker in {*makers(), "by-hand"}
-    if one.results:
-        assert (ROOT / "docs" / "results" / one.results).exists()
-    assert all(case.config.duration_s >= one.time_s for case in cases(one).values())
+def test_a_picture_can_be_made_as_the_list_says(subtests: pytest.Subtests) -> None:
+    for name in pictures():
+        with subtests.test(f"{name!r:.60}"):
+            one = pictures()[name]
+            command = words_of(one.command)
+            (check_annelid if command.words[0] == "annelid" else check_program)(command)
+            assert one.maker in {*makers(), "by-hand"}
+            if one.results:
+                assert (ROOT / "docs" / "results" / one.results).exists()
+            assert all(case.config.duration_s >= one.time_s for case in cases(one).values())
 
 
 def test_the_command_of_numbers_is_that_of_their_table() -> None:

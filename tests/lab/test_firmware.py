@@ -96,7 +96,7 @@ def controller_of(worm: str) -> Any:
 
 
 @COMPILER
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 def test_a_network_gives_the_same_bits_where_sums_are_in_the_same_order(
     seed: int, benchmark: ModuleType, exactly: Callable[..., float], tmp_path: Path
 ) -> None:
@@ -267,19 +267,3 @@ def test_random_networks_give_the_same_bits_for_100_000_steps(
 def test_every_controller_passes_its_self_test(worm: str, real: Any, tmp_path: Path) -> None:
     done = compiled_self_test(controller_firmware(controller_of(worm), worm, real=real), tmp_path)
     assert done.returncode == 0, done.stdout
-
-
-@pytest.mark.slow
-@COMPILER
-@ARM
-@pytest.mark.parametrize(("core", "real"), [("Cortex-M4", "float"), ("Cortex-M7", "double")])
-def test_a_controller_runs_on_a_microcontroller(core: str, real: Any, benchmark: ModuleType, tmp_path: Path) -> None:
-    controller = controller_of("robust")
-    firmware = controller_firmware(controller, "robust", real=real)
-    record = np.random.default_rng(0).uniform(0.0, 0.08, (200, 3)).astype(np.float32)
-    found = benchmark.on_arm(firmware, record, core, tmp_path)
-    truth = benchmark.replayed(controller_firmware(controller, "robust"), record, tmp_path)
-    assert np.abs(found["potential"] - truth).max() < (0.1 if real == "float" else 1e-9)
-    assert 500 < found["instructions"] < 20_000
-    assert found["flash"] < 20_000
-    assert found["ram"] < 8_000

@@ -83,7 +83,6 @@ def test_random_networks_are_read_back(benchmark: ModuleType, file: Callable[[st
 
 
 def test_pylems_computes_the_same_potentials(benchmark: ModuleType, tmp_path: Path) -> None:
-    pytest.importorskip("lems")
     found = benchmark.difference_mV(peristalsis_network(3), benchmark.PYLEMS, tmp_path, 0.5, 200.0)
     assert found < 1e-9
     assert benchmark.difference_mV(all_parts(), benchmark.PYLEMS, tmp_path, 0.5, 200.0) < 1e-9
@@ -91,7 +90,6 @@ def test_pylems_computes_the_same_potentials(benchmark: ModuleType, tmp_path: Pa
 
 @pytest.mark.parametrize("seed", [1, 3, 7])
 def test_spikes_and_releases_are_the_same_too(seed: int, benchmark: ModuleType, tmp_path: Path) -> None:
-    pytest.importorskip("lems")
     network = benchmark.random_network(seed)
     kinds = [type(each.kind) for each in network.connections]
     assert SpikingSynapse in kinds
@@ -153,13 +151,14 @@ REFUSED: dict[str, tuple[Callable[[str], str], str]] = {
 }
 
 
-@pytest.mark.parametrize("what", REFUSED)
-def test_a_strange_file_is_refused_with_a_sentence(what: str, file: Callable[[str], Path]) -> None:
-    change, sentence = REFUSED[what]
-    text = lems_text(peristalsis_network(3))
-    assert change(text) != text
-    with pytest.raises(ConfigError, match=sentence):
-        read_lems(file(change(text)))
+def test_a_strange_file_is_refused_with_a_sentence(subtests: pytest.Subtests, file: Callable[[str], Path]) -> None:
+    for what in REFUSED:
+        with subtests.test(f"{what!r:.60}"):
+            change, sentence = REFUSED[what]
+            text = lems_text(peristalsis_network(3))
+            assert change(text) != text
+            with pytest.raises(ConfigError, match=sentence):
+                read_lems(file(change(text)))
 
 
 def test_a_large_file_is_refused(file: Callable[[str], Path]) -> None:
@@ -190,7 +189,7 @@ def test_the_command_writes_and_reads(tmp_path: Path, monkeypatch: pytest.Monkey
         assert run(app, ["export-network", "network.xml", *arguments]).exit_code == 2
 
 
-@pytest.mark.parametrize("value", [np.inf, np.nan, 0.0])
-def test_times_of_the_simulation_are_checked(value: float) -> None:
-    with pytest.raises(ConfigError, match="timestep_ms"):
-        lems_text(peristalsis_network(3), timestep_ms=value)
+def test_times_of_the_simulation_are_checked(subtests: pytest.Subtests) -> None:
+    for value in (np.inf, np.nan, 0.0):
+        with subtests.test(f"{value!r:.60}"), pytest.raises(ConfigError, match="timestep_ms"):
+            lems_text(peristalsis_network(3), timestep_ms=value)

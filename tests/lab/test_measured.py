@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -154,13 +155,15 @@ HANDLED: dict[str, tuple[Change, dict[str, object], str]] = {
 }
 
 
-@pytest.mark.parametrize("defect", HANDLED)
-def test_a_defect_is_handled_and_noted(run: Run, tmp_path: Path, defect: str) -> None:
-    change, fields, words = HANDLED[defect]
-    found = agreement_of(run, change(log_of(run)), tmp_path, **fields)
-    assert all(one.rms < 0.03 * one.amplitude[1] for one in found.signals.values())
-    assert words in " ".join(found.notes)
-    assert bool(found.notes) == bool(words)
+def test_a_defect_is_handled_and_noted(subtests: pytest.Subtests, run: Run, tmp_path: Path) -> None:
+    for defect in HANDLED:
+        with subtests.test(f"{defect!r:.60}"):
+            folder = Path(tempfile.mkdtemp(dir=tmp_path))
+            change, fields, words = HANDLED[defect]
+            found = agreement_of(run, change(log_of(run)), folder, **fields)
+            assert all(one.rms < 0.03 * one.amplitude[1] for one in found.signals.values())
+            assert words in " ".join(found.notes)
+            assert bool(found.notes) == bool(words)
 
 
 REFUSED: dict[str, tuple[Change, dict[str, object], str]] = {
@@ -196,12 +199,14 @@ REFUSED: dict[str, tuple[Change, dict[str, object], str]] = {
 }
 
 
-@pytest.mark.parametrize("defect", REFUSED)
-def test_a_defect_is_refused_in_a_sentence(run: Run, tmp_path: Path, defect: str) -> None:
-    change, fields, words = REFUSED[defect]
-    with pytest.raises(AnnelidError, match=words) as refused:
-        agreement_of(run, change(log_of(run)), tmp_path, **fields)
-    assert "\n" not in str(refused.value)
+def test_a_defect_is_refused_in_a_sentence(subtests: pytest.Subtests, run: Run, tmp_path: Path) -> None:
+    for defect in REFUSED:
+        with subtests.test(f"{defect!r:.60}"):
+            folder = Path(tempfile.mkdtemp(dir=tmp_path))
+            change, fields, words = REFUSED[defect]
+            with pytest.raises(AnnelidError, match=words) as refused:
+                agreement_of(run, change(log_of(run)), folder, **fields)
+            assert "\n" not in str(refused.value)
 
 
 def test_a_sensor_that_never_changes_is_noted_and_the_others_are_compared(run: Run, tmp_path: Path) -> None:
@@ -331,47 +336,45 @@ def test_a_tracked_point_travels_along_its_net_motion(run: Run, tmp_path: Path) 
     assert compared(run, tmp_path / "log.csv", **given_map).signals["head"].rms < 0.004
 
 
-@pytest.mark.parametrize(
-    ("reference", "words"),
-    [
+def test_a_reference_that_is_none_is_refused(subtests: pytest.Subtests, run: Run) -> None:
+    for reference, words in (
         ("stretch_lenght[1, left]", "no signal 'stretch_lenght'.*stretch_length"),
         ("stretch_length[1]", "a label for each of segment, sensor"),
         ("stretch_length[4, left]", "unknown segment '4', it is one of 1, 2, 3, mean"),
         ("stretch_length[1, top]", "unknown sensor 'top', it is one of 0, 1, 2, 3, 4, 5, left, right, mean"),
         ("stretch_length[mean, left]", "name a segment"),
         ("stretch_length[1, left", "no signal"),
-    ],
-)
-def test_a_reference_that_is_none_is_refused(run: Run, reference: str, words: str) -> None:
-    with pytest.raises(ConfigError, match=words):
-        run_series(run, reference)
+    ):
+        with subtests.test(f"{reference!r:.60}"), pytest.raises(ConfigError, match=words):
+            run_series(run, reference)
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
+def test_a_map_that_is_none_is_refused(subtests: pytest.Subtests, tmp_path: Path) -> None:
+    for text, words in (
         ("time = 't'\n[map]\n", "maps no column"),
         ("[map]\na = 'ring_length[ring_0]'\n", "needs either time"),
         ("time = 't'\nrate_Hz = 3\n[map]\na = 'x'\n", "needs either time"),
         ("time = 't'\n[map.a]\nsignal = 'x'\nunti = 'mm'\n", "unti"),
         ("time = 't'\nclock_drift = 3\n[map]\na = 'x'\n", "clock_drift"),
         ("time = ", "TOML"),
-    ],
-)
-def test_a_map_that_is_none_is_refused(tmp_path: Path, text: str, words: str) -> None:
-    (tmp_path / "map.toml").write_text(text)
-    with pytest.raises(ConfigError, match=words):
-        read_map(tmp_path / "map.toml")
+    ):
+        with subtests.test(f"{text!r:.60}"):
+            folder = Path(tempfile.mkdtemp(dir=tmp_path))
+            (folder / "map.toml").write_text(text)
+            with pytest.raises(ConfigError, match=words):
+                read_map(folder / "map.toml")
 
 
-@pytest.mark.parametrize("name", ["log.csv", "log.parquet", "log.mat", "log.nc", "log.h5"])
-@pytest.mark.parametrize("content", [b"", b"\x00\xff\xfe garbage \x80", b"MATLAB 7.3"])
-def test_a_damaged_file_is_refused_in_a_sentence(tmp_path: Path, name: str, content: bytes) -> None:
-    (tmp_path / name).write_bytes(content)
-    with pytest.raises(AnnelidError):
-        read_measured(tmp_path / name, LogMap.model_validate({"time": "t_ms", "map": SIGNALS}))
-    with pytest.raises(UnreadableText, match="no such file"):
-        read_measured(tmp_path / "none.csv", LogMap.model_validate({"time": "t_ms", "map": SIGNALS}))
+def test_a_damaged_file_is_refused_in_a_sentence(subtests: pytest.Subtests, tmp_path: Path) -> None:
+    for content in (b"", b"\x00\xff\xfe garbage \x80", b"MATLAB 7.3"):
+        for name in ("log.csv", "log.parquet", "log.mat", "log.nc", "log.h5"):
+            with subtests.test(f"{content!r:.60}, {name!r:.60}"):
+                folder = Path(tempfile.mkdtemp(dir=tmp_path))
+                (folder / name).write_bytes(content)
+                with pytest.raises(AnnelidError):
+                    read_measured(folder / name, LogMap.model_validate({"time": "t_ms", "map": SIGNALS}))
+                with pytest.raises(UnreadableText, match="no such file"):
+                    read_measured(folder / "none.csv", LogMap.model_validate({"time": "t_ms", "map": SIGNALS}))
 
 
 def test_a_small_file_that_holds_terabytes_is_refused_before_it_is_read(tmp_path: Path) -> None:
@@ -401,17 +404,17 @@ def elsewhere_by_layout(file: h5py.File, secret: Path) -> None:
     file.create_virtual_dataset("t_ms", layout)
 
 
-@pytest.mark.parametrize("name", ["log.h5", "log.nc"])
-@pytest.mark.parametrize("point", [elsewhere_by_link, elsewhere_by_storage, elsewhere_by_layout])
-def test_a_file_that_points_to_others_is_refused(
-    tmp_path: Path, name: str, point: Callable[[h5py.File, Path], None]
-) -> None:
-    with h5py.File(tmp_path / "secret.h5", "w") as file:
-        file["numbers"] = np.arange(8.0)
-    with h5py.File(tmp_path / name, "w") as file:
-        point(file, tmp_path / "secret.h5")
-    with pytest.raises(UnreadableText, match="elsewhere"):
-        read_measured(tmp_path / name, LogMap.model_validate({"time": "t_ms", "map": SIGNALS}))
+def test_a_file_that_points_to_others_is_refused(subtests: pytest.Subtests, tmp_path: Path) -> None:
+    for point in (elsewhere_by_link, elsewhere_by_storage, elsewhere_by_layout):
+        for name in ("log.h5", "log.nc"):
+            with subtests.test(f"{point!r:.60}, {name!r:.60}"):
+                folder = Path(tempfile.mkdtemp(dir=tmp_path))
+                with h5py.File(folder / "secret.h5", "w") as file:
+                    file["numbers"] = np.arange(8.0)
+                with h5py.File(folder / name, "w") as file:
+                    point(file, folder / "secret.h5")
+                with pytest.raises(UnreadableText, match="elsewhere"):
+                    read_measured(folder / name, LogMap.model_validate({"time": "t_ms", "map": SIGNALS}))
 
 
 def test_a_tracked_frame_far_away_is_refused(run: Run, tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -171,11 +172,12 @@ REFUSED = {
 }
 
 
-@pytest.mark.parametrize("case", REFUSED)
-def test_what_no_robot_can_have_is_refused_in_a_sentence(case: str) -> None:
-    xml, fields, words = REFUSED[case]
-    with pytest.raises(ConfigError, match=words):
-        robot(xml, **fields)
+def test_what_no_robot_can_have_is_refused_in_a_sentence(subtests: pytest.Subtests) -> None:
+    for case in REFUSED:
+        with subtests.test(f"{case!r:.60}"):
+            xml, fields, words = REFUSED[case]
+            with pytest.raises(ConfigError, match=words):
+                robot(xml, **fields)
 
 
 @pytest.mark.parametrize(
@@ -191,9 +193,8 @@ def test_an_actuator_that_is_no_ring_is_refused(xml: str, words: str) -> None:
         plant_of(robot(xml))
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
+def test_a_composite_that_is_no_cable_is_refused(subtests: pytest.Subtests, tmp_path: Path) -> None:
+    for text, words in (
         ('<composite type="grid" prefix="c" count="9 9 1"/>', "only a cable"),
         ('<composite type="cable" prefix="c" vertex="0 0 0 1 1"/>', "three numbers"),
         (f'<composite type="cable" prefix="c" vertex="{"1 " * 9}"/>', "no two vertices alike"),
@@ -201,12 +202,12 @@ def test_an_actuator_that_is_no_ring_is_refused(xml: str, words: str) -> None:
         (f'<composite type="cable" prefix="c" vertex="{"1 " * 900}"/>', "of each of 3 to 180 places"),
         ('<composite type="cable" prefix="c" vertex="0" quat="1 0 0 0"/>', "<composite quat=..>: a cable cannot"),
         ('<composite type="cable" prefix="c" vertex="0"><plugin plugin="x"/></composite>', "others are code"),
-    ],
-)
-def test_a_composite_that_is_no_cable_is_refused(tmp_path: Path, text: str, words: str) -> None:
-    (tmp_path / "c.xml").write_text(f"<mujoco><worldbody>{FLOOR}{text}</worldbody></mujoco>")
-    with pytest.raises(ConfigError, match=words):
-        load_config(tmp_path / "c.xml")
+    ):
+        with subtests.test(f"{text!r:.60}"):
+            folder = Path(tempfile.mkdtemp(dir=tmp_path))
+            (folder / "c.xml").write_text(f"<mujoco><worldbody>{FLOOR}{text}</worldbody></mujoco>")
+            with pytest.raises(ConfigError, match=words):
+                load_config(folder / "c.xml")
 
 
 def test_the_section_has_its_own_ground() -> None:

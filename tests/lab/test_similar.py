@@ -95,20 +95,17 @@ def test_the_written_worm_is_the_computed_one(tmp_path: Path) -> None:
     assert read.model_dump(exclude={"name"}) == worm(0.05, 5, 8, 0.4).model_dump(exclude={"name"})
 
 
-@pytest.mark.parametrize(
-    ("geometry", "words"),
-    [
+def test_a_geometry_that_cannot_work_is_refused(subtests: pytest.Subtests) -> None:
+    for geometry, words in (
         ((0.05, 3, 12, 3.0), "length_m = 3 does not fit 3 segments of radius 0.05 m"),
         ((0.05, 3, 12, -1.0), "length_m must be positive, not -1"),
         ((0.05, 3, 7), "n_helices = 7: .*even"),
         ((0.05, 2), "n_segments = 2"),
         ((-1.0,), "radius_m = -1"),
         ((0.001,), "the engine refuses this body"),
-    ],
-)
-def test_a_geometry_that_cannot_work_is_refused(geometry: tuple[Any, ...], words: str) -> None:
-    with pytest.raises(ConfigError, match=words):
-        worm_text(*geometry)
+    ):
+        with subtests.test(f"{geometry!r:.60}"), pytest.raises(ConfigError, match=words):
+            worm_text(*geometry)  # type: ignore[arg-type]
 
 
 @pytest.mark.slow

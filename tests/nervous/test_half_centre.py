@@ -15,16 +15,16 @@ from annelid.nervous import (
     half_centre_network,
     half_centre_of_period,
     oscillation_periods,
-    peristalsis_network,
 )
 
 
-@pytest.mark.parametrize("slope", [0.04, 0.05, 0.06])
-def test_delta_is_the_distance_from_the_bifurcation(slope):
-    deltas = [-0.1, -0.01, 0.01, 0.1, 1.0]
-    periods = oscillation_periods([HalfCentre(bifurcation_mV=d, gate_slope_per_mV=slope) for d in deltas])
-    assert np.array_equal(np.isfinite(periods), np.array(deltas) > 0)
-    assert np.all(np.diff(periods[2:]) < 0)
+def test_delta_is_the_distance_from_the_bifurcation(subtests: pytest.Subtests) -> None:
+    for slope in (0.04, 0.05, 0.06):
+        with subtests.test(f"{slope!r:.60}"):
+            deltas = [-0.1, -0.01, 0.01, 0.1, 1.0]
+            periods = oscillation_periods([HalfCentre(bifurcation_mV=d, gate_slope_per_mV=slope) for d in deltas])
+            assert np.array_equal(np.isfinite(periods), np.array(deltas) > 0)
+            assert np.all(np.diff(periods[2:]) < 0)
 
 
 def test_with_negative_delta_both_states_are_stable():
@@ -54,28 +54,17 @@ def test_period_grows_with_the_gate_time_constant_and_many_at_once_are_as_one_by
     assert np.all(np.diff(together) > 0)
 
 
-@pytest.mark.parametrize("offset", [0.05, 0.1, 0.5])
-def test_hold_keeps_the_half_centre_beyond_its_range(offset):
-    p = HalfCentre(offset_mV=offset)
-    network = Network()
-    network.add_neuron("holder", Neuron(bias_nA=20.0), 20.0)
-    add_half_centre(network, "a", "b", p, (-offset, 20.0 + offset))
-    add_hold(network, "holder", down="a", up="b", half_centre=p)
-    a, b = network.compile(1.0).run(np.empty((6000, 0)))[-1, 0, 1:]
-    assert a < -offset
-    assert b >= 20.0
-
-
-def test_peristalsis_is_made_of_these_half_centres():
-    p = PeristalsisParameters(bifurcation_mV=0.02, offset_mV=0.2)
-    network = peristalsis_network(3, p)
-    twin = Network()
-    add_half_centre(twin, "contraction_1", "expansion_1", p)
-    ends = {("contraction_1", "expansion_1"), ("expansion_1", "contraction_1")}
-    assert isinstance(p, HalfCentre)
-    assert [c for c in network.connections if (c.source, c.target) in ends] == twin.connections
-    assert network.neurons["contraction_2"] == twin.neurons["contraction_1"]
-    assert network.initial_mV["contraction_2"] == -0.2
+def test_hold_keeps_the_half_centre_beyond_its_range(subtests: pytest.Subtests) -> None:
+    for offset in (0.05, 0.1, 0.5):
+        with subtests.test(f"{offset!r:.60}"):
+            p = HalfCentre(offset_mV=offset)
+            network = Network()
+            network.add_neuron("holder", Neuron(bias_nA=20.0), 20.0)
+            add_half_centre(network, "a", "b", p, (-offset, 20.0 + offset))
+            add_hold(network, "holder", down="a", up="b", half_centre=p)
+            a, b = network.compile(1.0).run(np.empty((6000, 0)))[-1, 0, 1:]
+            assert a < -offset
+            assert b >= 20.0
 
 
 @pytest.mark.parametrize(
@@ -112,9 +101,8 @@ def test_search_on_a_known_curve_passes_over_silence_and_refuses_a_gap():
         find_period(lambda v, _: np.full(v.size, np.inf), 900.0, (1.0, 2.0), parameter="gate")
 
 
-@pytest.mark.parametrize(
-    ("call", "message"),
-    [
+def test_impossible_requests_are_refused(subtests: pytest.Subtests) -> None:
+    for call, message in (
         (lambda: half_centre_of_period(1500.0, parameter="gate_time_constant"), "did you mean 'gate_time_constant_ms'"),
         (lambda: half_centre_of_period(-1.0), "period_ms"),
         (lambda: half_centre_of_period(1500.0, bounds=(300.0, 100.0)), "bounds of gate_time_constant_ms"),
@@ -123,8 +111,6 @@ def test_search_on_a_known_curve_passes_over_silence_and_refuses_a_gap():
         (lambda: HalfCentre(bifurcation_mV=-40.0), "bifurcation_mV"),
         (lambda: HalfCentre(offset_mV=0.0), "offset_mV"),
         (lambda: PeristalsisParameters(bifurcation_mV=-0.01), "bifurcation_mV must be positive"),
-    ],
-)
-def test_impossible_requests_are_refused(call, message):
-    with pytest.raises(ConfigError, match=message):
-        call()
+    ):
+        with subtests.test(f"{call!r:.60}"), pytest.raises(ConfigError, match=message):
+            call()

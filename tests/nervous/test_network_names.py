@@ -34,17 +34,14 @@ def test_unknown_neuron_suggests_the_nearest(network, add):
     assert list(network.outputs) == ["read"]
 
 
-@pytest.mark.parametrize(
-    ("add", "kind"),
-    [
+def test_duplicate_names_are_refused(subtests: pytest.Subtests, network) -> None:
+    for add, kind in (
         (lambda n: n.add_neuron("expansion", Neuron()), "neuron 'expansion'"),
         (lambda n: n.add_input("drive", "expansion"), "input 'drive'"),
         (lambda n: n.add_output("read", "contraction"), "output 'read'"),
-    ],
-)
-def test_duplicate_names_are_refused(network, add, kind):
-    with pytest.raises(ConfigError, match=f"{kind} exists already"):
-        add(network)
+    ):
+        with subtests.test(f"{add!r:.60}"), pytest.raises(ConfigError, match=f"{kind} exists already"):
+            add(network)
 
 
 def test_empty_network_is_refused():

@@ -18,7 +18,6 @@ from annelid.nervous import (
     ModulatorySynapse,
     Network,
     Neuron,
-    PeristalsisParameters,
     SpikingSynapse,
     Synapse,
     peristalsis_network,
@@ -86,11 +85,6 @@ def test_toml_round_trip_is_exact(network):
     assert again.to_toml() == text
 
 
-def test_peristalsis_network_survives_with_every_bit():
-    network = peristalsis_network(6, PeristalsisParameters(bifurcation_mV=0.1 / 3.0))
-    assert contents(Network.from_toml(network.to_toml())) == contents(network)
-
-
 def test_fields_left_out_take_their_defaults_and_whole_numbers_are_numbers():
     network = Network.from_toml(
         """
@@ -113,9 +107,8 @@ def test_fields_left_out_take_their_defaults_and_whole_numbers_are_numbers():
     assert network.connections[0].kind == GapJunction(0.5)
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
+def test_faulty_texts_are_refused(subtests: pytest.Subtests) -> None:
+    for text, message in (
         ("name = ", "not valid TOML"),
         ("nam = 'x'", "unknown field 'nam': did you mean 'name'"),
         ("name = 3", "name must be a string"),
@@ -140,11 +133,9 @@ def test_fields_left_out_take_their_defaults_and_whole_numbers_are_numbers():
             "conductance_uS = 1.0\nrectified = 1",
             "rectified must be true or false",
         ),
-    ],
-)
-def test_faulty_texts_are_refused(text, message):
-    with pytest.raises(ConfigError, match=message):
-        Network.from_toml(text)
+    ):
+        with subtests.test(f"{text!r:.60}"), pytest.raises(ConfigError, match=message):
+            Network.from_toml(text)
 
 
 def small_network() -> Network:

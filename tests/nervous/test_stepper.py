@@ -16,7 +16,6 @@ from annelid.nervous import (
     Neuron,
     PeristalsisParameters,
     Synapse,
-    peristalsis_network,
     persistent_sodium,
 )
 
@@ -110,33 +109,6 @@ def test_batch_equals_single_runs(recipe, scheme, n_worms, seed):
         np.testing.assert_array_equal(together[:, worm], alone[:, 0])
 
 
-@settings(max_examples=40)
-@given(
-    n_segments=st.integers(3, 9),
-    n_worms=st.integers(1, 40),
-    scheme=st.sampled_from(SCHEMES),
-    n_steps=st.integers(1, 25),
-    seed=st.integers(0, 999),
-)
-def test_worms_of_a_batch_of_any_size_are_bitwise_those_alone(n_segments, n_worms, scheme, n_steps, seed):
-    network = peristalsis_network(n_segments)
-    rng = np.random.default_rng(seed)
-    inputs = rng.uniform(0, 20, (n_worms, n_segments + 1))
-    batch, single = network.compile(1.0, scheme, n_worms), network.compile(1.0, scheme)
-    together = batch.initial_state()
-    together.potential += rng.uniform(-10, 10, together.potential.shape)
-    together.gate[...] = rng.uniform(0, 1, together.gate.shape)
-    start = together.copy()
-    batch.advance(together, inputs, n_steps)
-    for worm in range(n_worms):
-        alone = single.initial_state()
-        alone.potential[0], alone.gate[0] = start.potential[worm], start.gate[worm]
-        single.advance(alone, inputs[worm], n_steps)
-        np.testing.assert_array_equal(together.potential[worm], alone.potential[0])
-        np.testing.assert_array_equal(together.gate[worm], alone.gate[0])
-    assert (together.potential != start.potential).all()
-
-
 @settings(max_examples=60)
 @given(
     recipe=recipes(),
@@ -216,21 +188,6 @@ def test_one_input_for_all_copies_and_none_for_no_current():
     np.testing.assert_allclose(stepper.outputs(state), [[2.0]] * 3)
     stepper.advance(state)
     np.testing.assert_allclose(state.potential, [[2.0, 1.5]] * 3)
-
-
-def test_continuing_from_a_copy_is_bitwise_the_same():
-    recipe_like = Network()
-    recipe_like.add_neuron("a", Neuron(channels=(persistent_sodium(1.0),), bias_nA=3.0))
-    recipe_like.add_neuron("b", Neuron())
-    recipe_like.add_synapse("a", "b", Synapse(0.5, 100.0))
-    stepper = recipe_like.compile()
-    state = stepper.initial_state()
-    stepper.run(np.empty((50, 0)), state)
-    saved = state.copy()
-    first = stepper.run(np.empty((50, 0)), state)
-    second = recipe_like.compile().run(np.empty((50, 0)), saved)
-    assert np.array_equal(first, second)
-    assert not np.array_equal(first[0], first[-1])
 
 
 @pytest.mark.parametrize(

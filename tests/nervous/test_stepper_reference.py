@@ -3,7 +3,6 @@
 import math
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -17,7 +16,6 @@ from annelid.nervous import (
     Neuron,
     SpikingSynapse,
     Synapse,
-    peristalsis_network,
     persistent_sodium,
 )
 
@@ -183,15 +181,3 @@ def test_every_step_is_that_of_the_equations(network, scheme, seed):
             return
         np.testing.assert_allclose(state.potential, [expected] * 2, rtol=1e-11, atol=1e-11)
         np.testing.assert_allclose(state.threshold, [list(plain.theta.values())] * 2, rtol=1e-11)
-
-
-@pytest.mark.parametrize("scheme", ["euler", "toolbox"])
-def test_steps_of_the_worm_agree_to_twelve_digits(scheme):
-    network = peristalsis_network(3)
-    stepper, plain = network.compile(1.0, scheme), Plain(network, 1.0, scheme == "toolbox")
-    state = stepper.initial_state()
-    inputs = np.random.default_rng(1).choice([0.0, 20.0], (60, len(network.inputs)))
-    for row in np.repeat(inputs, 5, axis=0):
-        stepper.advance(state, row)
-        plain.advance(row)
-    np.testing.assert_allclose(state.potential[0], list(plain.u.values()), rtol=1e-12, atol=1e-12)

@@ -160,23 +160,21 @@ def test_populations_patterns_and_matrices_are_imported():
 
 
 @needs_toolbox
-@pytest.mark.parametrize(
-    ("name", "arguments", "n_inputs"),
-    [
+def test_arithmetic_networks_of_the_toolbox(subtests: pytest.Subtests) -> None:
+    for name, arguments, n_inputs in (
         ("AdditionNetwork", {"gains": [1.0, -0.5, 2.0]}, 3),
         ("MultiplicationNetwork", {}, 2),
         ("DivisionNetwork", {"gain": 1.0, "ratio": 0.2}, 2),
         ("DifferentiatorNetwork", {}, 1),
         ("IntegratorNetwork", {}, 1),
-    ],
-)
-def test_arithmetic_networks_of_the_toolbox(name, arguments, n_inputs):
-    net = getattr(networks, name)(**arguments)
-    first = 1 if name == "AdditionNetwork" else 0
-    for i in range(first, first + n_inputs):
-        net.add_input(i)
-    inputs = np.random.default_rng(5).uniform(0, 20, (30, n_inputs)).repeat(50, axis=0)
-    assert_same_traces(import_network(net), net, inputs, 0.05)
+    ):
+        with subtests.test(f"{name!r:.60}"):
+            net = getattr(networks, name)(**arguments)
+            first = 1 if name == "AdditionNetwork" else 0
+            for i in range(first, first + n_inputs):
+                net.add_input(i)
+            inputs = np.random.default_rng(5).uniform(0, 20, (30, n_inputs)).repeat(50, axis=0)
+            assert_same_traces(import_network(net), net, inputs, 0.05)
 
 
 @needs_toolbox
@@ -232,20 +230,17 @@ def with_shared_input() -> Network:
 
 
 @needs_toolbox
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
+def test_what_the_toolbox_cannot_say_is_refused(subtests: pytest.Subtests) -> None:
+    for make, message in (
         (Network, "no neurons"),
         (lambda: two_neurons(leak_conductance_uS=0.0), "no leak"),
         (lambda: two_neurons(channels=(Channel(1.0, 50.0, (Gate(0.1), Gate(0.2))),)), "2 instantaneous"),
         (with_two_synapses, "2 connections"),
         (with_two_junctions, "2 connections"),
         (with_shared_input, "drives 2 neurons"),
-    ],
-)
-def test_what_the_toolbox_cannot_say_is_refused(make, message):
-    with pytest.raises(ConfigError, match=message):
-        export_network(make())
+    ):
+        with subtests.test(f"{make!r:.60}"), pytest.raises(ConfigError, match=message):
+            export_network(make())
 
 
 @pytest.mark.parametrize("bridge", [export_network, import_network])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import shutil
+import tempfile
 import zipfile
 from collections.abc import Callable
 from dataclasses import replace
@@ -105,11 +106,13 @@ WRONG: dict[str, tuple[Callable[[Arrays], Arrays], str]] = {
 }
 
 
-@pytest.mark.parametrize("case", WRONG)
-def test_wrong_content_is_refused(run: Run, tmp_path: Path, case: str) -> None:
-    change, says = WRONG[case]
-    arrays = read_checkpoint(run.path).arrays()
-    assert says in refusal(run, tmp_path, packed(change(arrays)))
+def test_wrong_content_is_refused(subtests: pytest.Subtests, run: Run, tmp_path: Path) -> None:
+    for case in WRONG:
+        with subtests.test(f"{case!r:.60}"):
+            folder = Path(tempfile.mkdtemp(dir=tmp_path))
+            change, says = WRONG[case]
+            arrays = read_checkpoint(run.path).arrays()
+            assert says in refusal(run, folder, packed(change(arrays)))
 
 
 def test_an_array_takes_no_more_memory_than_it_has_bytes(run: Run, tmp_path: Path) -> None:

@@ -93,11 +93,6 @@ def test_a_large_file_is_compared_on_demand_only(run: Run, tmp_path: Path, monke
         verify_run(path)
 
 
-def test_other_readers_open_a_file_with_a_digest(run: Run) -> None:
-    with xarray.open_dataset(run.path) as data:
-        assert data.sizes["time"] == run.data.sizes["time"]
-
-
 def test_a_run_that_was_killed_carries_no_digest_and_opens(tmp_path: Path) -> None:
     code = (
         "import os, signal, annelid.simulation.digest as d\n"

@@ -9,6 +9,7 @@ import os
 import re
 import subprocess
 import sys
+import tempfile
 import xml.etree.ElementTree as ET
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -101,15 +102,17 @@ def hostile(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
     return changed
 
 
-@pytest.mark.parametrize("text", [*COMMANDS, "two\nlines", "a\ttab", "x" * 201])
-def test_a_name_is_one_line_of_printable_text(text: str, tmp_path: Path) -> None:
-    file = tmp_path / "my.toml"
-    file.write_text(f'extends = "riddle2022-planar"\nname = {json.dumps(text)}\n', encoding="utf-8")
-    for field in ("name", "summary") if len(text) < 200 else ("name",):
-        said = annelid("run", file, "--out", tmp_path / "run", "--set", f"{field}={json.dumps(text)}", code=2)
-        assert "name" in said
-        assert not (tmp_path / "run").exists()
-    assert load_config("riddle2022-planar", {"name": "Regenwurm \U0001fab1 \u5c3a\u8816 \u00a7"}).name
+def test_a_name_is_one_line_of_printable_text(subtests: pytest.Subtests, tmp_path: Path) -> None:
+    for text in (*COMMANDS, "two\nlines", "a\ttab", "x" * 201):
+        with subtests.test(f"{text!r:.60}"):
+            folder = Path(tempfile.mkdtemp(dir=tmp_path))
+            file = folder / "my.toml"
+            file.write_text(f'extends = "riddle2022-planar"\nname = {json.dumps(text)}\n', encoding="utf-8")
+            for field in ("name", "summary") if len(text) < 200 else ("name",):
+                said = annelid("run", file, "--out", folder / "run", "--set", f"{field}={json.dumps(text)}", code=2)
+                assert "name" in said
+                assert not (folder / "run").exists()
+            assert load_config("riddle2022-planar", {"name": "Regenwurm \U0001fab1 \u5c3a\u8816 \u00a7"}).name
 
 
 def test_a_name_of_markup_is_shown_as_it_is(folder: Path, tmp_path: Path) -> None:
@@ -149,10 +152,11 @@ def test_a_strangers_run_is_shown_and_exported_as_text(hostile: Run, tmp_path: P
     assert "\\u001b[2J" in page
 
 
-@pytest.mark.parametrize("words", [["show", "{}"], ["{}"], ["run", "--{}"], ["run", "--set", "{}=1"], ["cite", "{}"]])
-def test_an_error_names_what_is_wrong_as_text(words: list[str]) -> None:
-    hostile = HOSTILE.replace("\x00", "")
-    assert annelid(*(word.format(hostile) if "{" in word else word for word in words), code=2)
+def test_an_error_names_what_is_wrong_as_text(subtests: pytest.Subtests) -> None:
+    for words in (["show", "{}"], ["{}"], ["run", "--{}"], ["run", "--set", "{}=1"], ["cite", "{}"]):
+        with subtests.test(f"{words!r:.60}"):
+            hostile = HOSTILE.replace("\x00", "")
+            assert annelid(*(word.format(hostile) if "{" in word else word for word in words), code=2)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pseudo-terminals")
@@ -203,19 +207,10 @@ def test_the_console_takes_neither_markup_nor_commands() -> None:
     assert file.getvalue().count("[/bold]") == 5
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "Regenwurm",
-        "\U0001fab1",
-        "a\u00a0b\u2009c",
-        "\u5c3a\u8816",
-        "two\nlines\t",
-        "\u0939\u093f\u0928\u094d\u0926\u0940",
-    ],
-)
-def test_other_text_stays_as_it_is(text: str) -> None:
-    assert printable(text) == text
+def test_other_text_stays_as_it_is() -> None:
+    hindi = "\u0939\u093f\u0928\u094d\u0926\u0940"
+    for text in ("Regenwurm", "\U0001fab1", "a\u00a0b\u2009c", "\u5c3a\u8816", "two\nlines\t", hindi):
+        assert printable(text) == text
 
 
 def test_tables_hold_no_formulas(tmp_path: Path) -> None:
@@ -263,7 +258,6 @@ def test_mjcf_of_any_name_is_xml(tmp_path: Path) -> None:
 
 
 def test_an_exported_view_shows_the_name_and_loads_nothing(tmp_path: Path) -> None:
-    pytest.importorskip("viser", reason="the live view needs viser: pip install '.[view]'")
     path = tmp_path / "walk.html"
     words = ["riddle2023-rods", "--set", "duration_s=0.05", "--set", f"name={json.dumps(NAME)}"]
     annelid("view", *words, "--export", path)
@@ -274,7 +268,6 @@ def test_an_exported_view_shows_the_name_and_loads_nothing(tmp_path: Path) -> No
 
 
 def test_the_panel_of_a_view_shows_names_as_text() -> None:
-    pytest.importorskip("viser", reason="the live view needs viser: pip install '.[view]'")
     from annelid.live.panel import status_html
 
     assert {tag for tag, _ in Tags(status_html(NAME, [NAME], NAME)).found} == {"div", "b"}

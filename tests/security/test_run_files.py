@@ -118,18 +118,17 @@ ATTACKS: dict[str, Change] = {
 }
 
 
-@pytest.mark.parametrize("attack", ATTACKS)
-def test_what_no_run_file_holds_is_refused_before_it_is_read(run: Run, folder: Path, attack: str) -> None:
-    path = changed(run, folder / "run.nc", ATTACKS[attack])
-    for read in (open_run, read_config, read_checkpoint):
-        with pytest.raises(RunFileError) as caught:
-            read(path)
-        assert "\n" not in str(caught.value)
+def test_what_no_run_file_holds_is_refused_before_it_is_read(subtests: pytest.Subtests, run: Run, folder: Path) -> None:
+    for attack in ATTACKS:
+        with subtests.test(f"{attack!r:.60}"):
+            path = changed(run, folder / "run.nc", ATTACKS[attack])
+            for read in (open_run, read_config, read_checkpoint):
+                with pytest.raises(RunFileError) as caught:
+                    read(path)
+                assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    "attack", [pytest.param(name, marks=[pytest.mark.slow] * (number % 6 != 0)) for number, name in enumerate(ATTACKS)]
-)
+@pytest.mark.parametrize("attack", list(ATTACKS)[::6])
 def test_commands_tell_of_what_no_run_file_holds_in_a_sentence(run: Run, folder: Path, attack: str) -> None:
     path = changed(run, folder / "run.nc", ATTACKS[attack])
     before = sorted(folder.iterdir())

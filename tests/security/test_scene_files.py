@@ -93,20 +93,19 @@ def refusal(path: Path) -> str:
     return sentence
 
 
-@pytest.mark.parametrize(("text", "reason"), HOSTILE.values(), ids=HOSTILE)
-def test_a_file_is_refused_for_what_a_scene_cannot_have(tmp_path: Path, text: str, reason: str) -> None:
+def test_a_file_a_configuration_and_a_run_file_are_refused_for_what_a_scene_cannot_have(
+    tmp_path: Path, subtests: pytest.Subtests
+) -> None:
     path = tmp_path / "scene.xml"
-    path.write_text(text, encoding="utf-8")
-    assert reason in refusal(path)
-
-
-@pytest.mark.parametrize("text", [text for text, _ in HOSTILE.values()], ids=HOSTILE)
-def test_a_configuration_or_a_run_file_is_refused_for_the_same(text: str) -> None:
-    with pytest.raises(ConfigError, match=r"arena\.xml"):
-        load_config("crawler", {"arena": {"kind": "scene", "xml": text}})
-    tree = load_config("crawler").model_dump() | {"arena": {"kind": "scene", "xml": text}}
-    with pytest.raises(ValueError, match=r"arena\.xml"):
-        RunConfig.model_validate(tree)
+    whole = load_config("crawler").model_dump()
+    for name, (text, reason) in HOSTILE.items():
+        with subtests.test(name):
+            path.write_text(text, encoding="utf-8")
+            assert reason in refusal(path)
+            with pytest.raises(ConfigError, match=r"arena\.xml"):
+                load_config("crawler", {"arena": {"kind": "scene", "xml": text}})
+            with pytest.raises(ValueError, match=r"arena\.xml"):
+                RunConfig.model_validate(whole | {"arena": {"kind": "scene", "xml": text}})
 
 
 def test_the_text_of_a_configuration_opens_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -134,14 +133,22 @@ def meshed(name: str, folder: str = "") -> str:
     return scene('<geom type="mesh" mesh="m"/>', asset)
 
 
-@pytest.mark.parametrize(
-    ("name", "folder"),
-    [
-        ("{tmp}/outside.obj", ""),
+@pytest.mark.skipif(sys.platform == "win32", reason="links need rights there")
+def test_a_mesh_lies_beside_its_scene_or_below(tmp_path: Path, subtests: pytest.Subtests) -> None:
+    home = tmp_path / "home"
+    (home / "below").mkdir(parents=True)
+    (tmp_path / "outside.obj").write_text(OBJ)
+    (home / "below" / "mesh.txt").write_text(OBJ)
+    (home / "link.obj").symlink_to(tmp_path / "outside.obj")
+    (home / "linked").symlink_to(tmp_path)
+    (home / "loop.obj").symlink_to(home / "loop.obj")
+    path = home / "scene.xml"
+    for name, folder in (
+        (f"{tmp_path}/outside.obj", ""),
         ("../outside.obj", ""),
         ("below/../../outside.obj", ""),
         ("outside.obj", ".."),
-        ("outside.obj", "{tmp}"),
+        ("outside.obj", str(tmp_path)),
         ("outside.obj", "below/../.."),
         ("..\\outside.obj", ""),
         ("C:/outside.obj", ""),
@@ -152,20 +159,10 @@ def meshed(name: str, folder: str = "") -> str:
         ("below/mesh.txt", ""),
         ("", ""),
         ("a&#10;b.obj", ""),
-    ],
-)
-@pytest.mark.skipif(sys.platform == "win32", reason="links need rights there")
-def test_a_mesh_lies_beside_its_scene_or_below(tmp_path: Path, name: str, folder: str) -> None:
-    home = tmp_path / "home"
-    (home / "below").mkdir(parents=True)
-    (tmp_path / "outside.obj").write_text(OBJ)
-    (home / "below" / "mesh.txt").write_text(OBJ)
-    (home / "link.obj").symlink_to(tmp_path / "outside.obj")
-    (home / "linked").symlink_to(tmp_path)
-    (home / "loop.obj").symlink_to(home / "loop.obj")
-    path = home / "scene.xml"
-    path.write_text(meshed(name.format(tmp=tmp_path), folder.format(tmp=tmp_path)))
-    assert "file=" in refusal(path)
+    ):
+        with subtests.test(name=name, folder=folder):
+            path.write_text(meshed(name, folder))
+            assert "file=" in refusal(path)
 
 
 def test_a_link_within_the_folder_and_a_folder_of_meshes_are_fine(tmp_path: Path) -> None:
@@ -217,16 +214,17 @@ BAD_FILES = {
         "one row": picture(8, 1),
     },
 }
-CASES = [(name, case) for name, cases in BAD_FILES.items() for case in cases]
 
 
-@pytest.mark.parametrize(("name", "case"), CASES, ids=["-".join(case) for case in CASES])
-def test_a_damaged_or_huge_file_is_refused(tmp_path: Path, name: str, case: str) -> None:
-    (tmp_path / name).write_bytes(BAD_FILES[name][case])
+def test_a_damaged_or_huge_file_is_refused(tmp_path: Path, subtests: pytest.Subtests) -> None:
     path = tmp_path / "scene.xml"
     field = '<asset><hfield name="m" file="field.png" size="1 1 1 1"/></asset>'
-    path.write_text(scene('<geom type="hfield" hfield="m"/>', field) if name == "field.png" else meshed(name))
-    refusal(path)
+    for name, cases in BAD_FILES.items():
+        path.write_text(scene('<geom type="hfield" hfield="m"/>', field) if name == "field.png" else meshed(name))
+        for case, content in cases.items():
+            (tmp_path / name).write_bytes(content)
+            with subtests.test(name, case=case):
+                refusal(path)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has neither such devices nor such pipes")
@@ -253,10 +251,11 @@ REFUSED_BY_THE_ENGINE = {
 }
 
 
-@pytest.mark.parametrize("world", REFUSED_BY_THE_ENGINE.values(), ids=REFUSED_BY_THE_ENGINE)
-def test_what_the_engine_refuses_is_said_of_the_scene(world: str) -> None:
+def test_what_the_engine_refuses_is_said_of_the_scene(subtests: pytest.Subtests) -> None:
     from annelid.body import build_spec
 
-    with pytest.raises(AnnelidError, match="scene") as error:
-        build_spec(load_config("crawler", {"arena": {"kind": "scene", "xml": scene(world)}}))
-    assert "\n" not in str(error.value)
+    for name, world in REFUSED_BY_THE_ENGINE.items():
+        with subtests.test(name):
+            with pytest.raises(AnnelidError, match="scene") as error:
+                build_spec(load_config("crawler", {"arena": {"kind": "scene", "xml": scene(world)}}))
+            assert "\n" not in str(error.value)

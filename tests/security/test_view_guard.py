@@ -10,11 +10,8 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
-import pytest
-
-pytest.importorskip("viser", reason="the live view needs viser: pip install '.[view]'")
-
 import msgspec
+import pytest
 import viser
 from websockets.exceptions import ConnectionClosed, ConnectionClosedError, InvalidStatus
 from websockets.sync.client import connect
@@ -28,6 +25,9 @@ if TYPE_CHECKING:
 
 CAMERA = {"wxyz": (1.0, 0.0, 0.0, 0.0), "position": (1.0, 1.0, 1.0), "look_at": (0.0, 0.0, 0.0)}
 CAMERA |= {"image_height": 9, "image_width": 9, "fov": 1.0, "near": 0.1, "far": 9.0, "up_direction": (0.0, 0.0, 1.0)}
+
+
+UPLOAD = {"source_component_uuid": "x", "transfer_uuid": "x", "filename": "x", "mime_type": "x"}
 
 
 @pytest.fixture(scope="module")
@@ -92,44 +92,51 @@ def test_the_page_opens_with_the_token(server: Server) -> None:
     assert get(server, path, Host="localhost:9000")[0] == 200
 
 
-@pytest.mark.parametrize(
-    "path", ["/", "/index.html", "//", "/?token", "/{}x/", "/x{}/", "/\u00e9/", "/%2e%2e/{}/", "/ws"]
-)
-def test_without_the_token_nothing_is_served(server: Server, path: str) -> None:
-    asked = path.format(server.token).encode().decode("latin-1")
-    link = http.client.HTTPConnection("127.0.0.1", server.get_port(), timeout=20)
-    link._encode_request = lambda request: request.encode("latin-1")  # type: ignore[attr-defined]
-    link.request("GET", asked)
-    answer = link.getresponse()
-    assert (answer.status, answer.read().decode()) == (403, guard.WRONG_TOKEN)
+def test_without_the_token_nothing_is_served(subtests: pytest.Subtests, server: Server) -> None:
+    for path in ("/", "/index.html", "//", "/?token", "/{}x/", "/x{}/", "/\u00e9/", "/%2e%2e/{}/", "/ws"):
+        with subtests.test(f"{path!r:.60}"):
+            asked = path.format(server.token).encode().decode("latin-1")
+            link = http.client.HTTPConnection("127.0.0.1", server.get_port(), timeout=20)
+            link._encode_request = lambda request: request.encode("latin-1")  # type: ignore[attr-defined]
+            link.request("GET", asked)
+            answer = link.getresponse()
+            assert (answer.status, answer.read().decode()) == (403, guard.WRONG_TOKEN)
 
 
-@pytest.mark.parametrize(
-    "host",
-    ["evil.example", "evil.example:8080", "127.0.0.1.evil.example", "127.0.0.1@evil.example", "0.0.0.0", "", "["],
-)
-def test_another_name_for_this_machine_is_refused(server: Server, host: str) -> None:
-    status, words = get(server, f"/{server.token}/", Host=host)
-    assert (status, words.decode()) == (403, guard.WRONG_HOST)
-    with pytest.raises(InvalidStatus) as refused:
-        websocket(server, f"/{server.token}", f"http://{host}", Host=host)
-    assert refused.value.response.status_code in (400, 403)
+def test_another_name_for_this_machine_is_refused(subtests: pytest.Subtests, server: Server) -> None:
+    for host in (
+        "evil.example",
+        "evil.example:8080",
+        "127.0.0.1.evil.example",
+        "127.0.0.1@evil.example",
+        "0.0.0.0",
+        "",
+        "[",
+    ):
+        with subtests.test(f"{host!r:.60}"):
+            status, words = get(server, f"/{server.token}/", Host=host)
+            assert (status, words.decode()) == (403, guard.WRONG_HOST)
+            with pytest.raises(InvalidStatus) as refused:
+                websocket(server, f"/{server.token}", f"http://{host}", Host=host)
+            assert refused.value.response.status_code in (400, 403)
 
 
-@pytest.mark.parametrize("origin", ["http://evil.example", "null", "http://localhost:1", "http://127.0.0.1", None])
-def test_another_page_gets_no_websocket(server: Server, origin: str | None) -> None:
-    with pytest.raises(InvalidStatus) as refused:
-        websocket(server, f"/{server.token}", origin)
-    assert refused.value.response.status_code == 403
-    if origin is not None:
-        assert get(server, f"/{server.token}/", Origin=origin) == (403, guard.WRONG_ORIGIN.encode())
+def test_another_page_gets_no_websocket(subtests: pytest.Subtests, server: Server) -> None:
+    for origin in ("http://evil.example", "null", "http://localhost:1", "http://127.0.0.1", None):
+        with subtests.test(f"{origin!r:.60}"):
+            with pytest.raises(InvalidStatus) as refused:
+                websocket(server, f"/{server.token}", origin)
+            assert refused.value.response.status_code == 403
+            if origin is not None:
+                assert get(server, f"/{server.token}/", Origin=origin) == (403, guard.WRONG_ORIGIN.encode())
 
 
-@pytest.mark.parametrize("path", ["", "/", "/wrong", "/{}x"])
-def test_a_websocket_needs_the_token(server: Server, path: str) -> None:
-    with pytest.raises(InvalidStatus) as refused:
-        websocket(server, path.format(server.token), f"http://{place(server)}")
-    assert refused.value.response.status_code == 403
+def test_a_websocket_needs_the_token(subtests: pytest.Subtests, server: Server) -> None:
+    for path in ("", "/", "/wrong", "/{}x"):
+        with subtests.test(f"{path!r:.60}"):
+            with pytest.raises(InvalidStatus) as refused:
+                websocket(server, path.format(server.token), f"http://{place(server)}")
+            assert refused.value.response.status_code == 403
 
 
 def test_the_page_itself_is_listened_to(server: Server) -> None:
@@ -141,18 +148,9 @@ def test_the_page_itself_is_listened_to(server: Server) -> None:
             sleep(0.01)
 
 
-@pytest.mark.parametrize(
-    "sent",
-    [
-        message(
-            "FileTransferStartUpload",
-            source_component_uuid="x",
-            transfer_uuid="x",
-            filename="x",
-            mime_type="x",
-            part_count=1000,
-            size_bytes=700_000_000,
-        ),
+def test_what_the_page_never_says_ends_the_connection(subtests: pytest.Subtests, server: Server) -> None:
+    for sent in (
+        message("FileTransferStartUpload", part_count=1000, size_bytes=700_000_000, **UPLOAD),
         message("FileTransferPart", source_component_uuid="x", transfer_uuid="x", part_index=0, content=b"x" * 1000),
         message("ShareUrlRequest"),
         message("RemoveSceneNodeMessage", name="/worm"),
@@ -167,42 +165,19 @@ def test_the_page_itself_is_listened_to(server: Server) -> None:
         b"\xc1",
         b"",
         "a text",
-    ],
-    ids=[
-        "upload",
-        "part",
-        "share",
-        "scene",
-        "unknown",
-        "attribute",
-        "attributes",
-        "updates",
-        "none",
-        "list",
-        "kind",
-        "deep",
-        "broken",
-        "empty",
-        "text",
-    ],
-)
-def test_what_the_page_never_says_ends_the_connection(server: Server, sent: bytes | str) -> None:
-    with websocket(server, f"/{server.token}", f"http://{place(server)}") as socket:
-        socket.send(sent)
-        assert closed_with(socket) == 1008
-    assert server.gui._current_file_upload_states == {}
+    ):
+        with subtests.test(f"{sent!r:.60}"):
+            with websocket(server, f"/{server.token}", f"http://{place(server)}") as socket:
+                socket.send(sent)
+                assert closed_with(socket) == 1008
+            assert server.gui._current_file_upload_states == {}
 
 
-UPLOAD = {"source_component_uuid": "x", "transfer_uuid": "x", "filename": "x", "mime_type": "x"}
 FORBIDDEN = message("FileTransferStartUpload", part_count=1, size_bytes=10, **UPLOAD)
 TURNED = message("GuiUpdateMessage", uuid="x", updates={"value": 1.0})
 
 
-@pytest.mark.parametrize(
-    "sent",
-    [[FORBIDDEN] * 2, [FORBIDDEN] * 5, [FORBIDDEN] * 500, [FORBIDDEN, TURNED]],
-    ids=["2", "5", "500", "then allowed ones"],
-)
+@pytest.mark.parametrize("sent", [[FORBIDDEN] * 500, [FORBIDDEN, TURNED]], ids=["500", "then allowed ones"])
 def test_nothing_is_handled_after_what_the_page_never_says(server: Server, sent: list[bytes]) -> None:
     from viser import _messages
 

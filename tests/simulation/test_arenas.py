@@ -21,7 +21,7 @@ from annelid.simulation.stepping import build_controller
 from annelid.simulation.worm import WormPlant, compile_worm
 
 RODS = "riddle2023-rods"
-RESTLESS = ("floor", "setae", "slope", "rails", "steps", "rough", "pipe", "pipe.taper", "pipe.bend", "pipe.helix")
+RESTLESS = ("floor", "slope", "rails", "steps", "rough", "pipe.bend")
 
 
 def config(arena: str, preset: str = RODS, /, **changes: object) -> RunConfig:
@@ -137,30 +137,8 @@ def test_setae_slide_forwards_as_a_block_does_and_hold_backwards() -> None:
     assert np.abs(up[3:]).max() < 0.01 * down[-1]
 
 
-def breathing(arena: str, **changes: object) -> float:
-    """Travel in m, forwards positive, of a worm whose segments all contract at once, four times."""
-    plant = reset(config(arena, **changes))
-    places = []
-    for _ in range(4):
-        for activation in (0.6, 0.0):
-            settled(plant, 0.4, np.full(plant.n_muscles, activation))
-        places.append(-plant.observe().center_of_mass_m[0])
-    return places[-1] - places[0]
-
-
-@pytest.mark.slow
-def test_setae_rectify_a_breath_without_a_wave() -> None:
-    forwards = breathing("setae")
-    alike = breathing("setae", arena__backward_friction=0.3)
-    turned = breathing("setae", arena__friction=1.0, arena__backward_friction=0.3)
-    assert forwards > 0.05
-    assert turned < -0.05
-    assert abs(alike) < 0.2 * forwards
-
-
-@pytest.mark.parametrize("arena", [pytest.param("pipe.s", marks=pytest.mark.slow), "setae"])
-def test_a_batch_computes_the_same_bits_in_an_arena(arena: str) -> None:
-    configs = [config(arena), config(arena, arena__friction=0.6), config(arena)]
+def test_a_batch_computes_the_same_bits_in_an_arena() -> None:
+    configs = [config("setae"), config("setae", arena__friction=0.6), config("setae")]
     worms = batch(configs)
     alone = [reset(made) for made in configs]
     pull = np.tile([1.0, 0.0, 0.3], (alone[0].steps_to_move(), 1))
@@ -181,11 +159,10 @@ def test_worms_in_pipes_of_different_shapes_make_one_batch() -> None:
         assert worm.step(np.zeros(3)).center_of_mass_m[2] == pytest.approx(0.16, abs=0.02)
 
 
-@pytest.mark.parametrize("arena", ["pipe.taper", pytest.param("setae", marks=pytest.mark.slow)])
-def test_a_run_in_an_arena_continues_bit_for_bit(tmp_path: Path, arena: str) -> None:
-    whole = simulate(config(arena, duration_s=0.2), tmp_path / "whole", progress=False)
-    simulate(config(arena, duration_s=0.1), tmp_path / "first", progress=False)
-    rest = simulate(config(arena, duration_s=0.2), tmp_path / "rest", resume=tmp_path / "first", progress=False)
+def test_a_run_in_an_arena_continues_bit_for_bit(tmp_path: Path) -> None:
+    whole = simulate(config("pipe.taper", duration_s=0.2), tmp_path / "whole", progress=False)
+    simulate(config("pipe.taper", duration_s=0.1), tmp_path / "first", progress=False)
+    rest = simulate(config("pipe.taper", duration_s=0.2), tmp_path / "rest", resume=tmp_path / "first", progress=False)
     ours, theirs = rest.data, whole.data.isel(time=whole.data["time"] >= rest.data["time"][0])
     for name in ("ring_length", "contact_force", "center_of_mass"):
         assert np.array_equal(ours[name].values, theirs[name].values), name
@@ -227,7 +204,7 @@ def test_a_narrow_pipe_refuses_a_worm_that_does_not_fit_into_its_entry() -> None
         config("pipe", arena__bore_m=0.15)
 
 
-@pytest.mark.parametrize("arena", ["pipe", "pipe.hourglass", "rough"])
+@pytest.mark.parametrize("arena", ["pipe.hourglass", "rough"])
 def test_the_start_is_quiet(arena: str) -> None:
     """The skin overlaps nothing at time zero, so all that moves is what falls: less than its weight times its gap."""
     plant = reset(config(arena))
@@ -263,7 +240,7 @@ def test_a_walking_worm_stays_within_its_pipe() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("arena", ["pipe", "pipe.bend", "pipe.taper", "pipe.hourglass", "pipe.helix", "rough", "steps"])
+@pytest.mark.parametrize("arena", ["pipe.taper", "pipe.hourglass", "pipe.helix", "rough", "steps"])
 def test_a_worm_that_walks_for_half_a_minute_stays_within_its_arena(arena: str) -> None:
     leak, _ = leak_m(arena, 30.0)
     assert leak < 0.001

@@ -178,7 +178,7 @@ def pulled(data: mujoco.MjData, before_m_per_s: float) -> float:
     return -2.0 * (speed - before_m_per_s) / data.model.opt.timestep - 80.0 * spring_m - 1.5 * speed
 
 
-@pytest.mark.parametrize("step_s", [0.02, 0.005, 0.0005])
+@pytest.mark.parametrize("step_s", [0.02, 0.0005])
 def test_the_tension_of_a_muscle_that_sets_in_at_once_is_what_draws_its_load(step_s: float) -> None:
     model = mujoco.MjModel.from_xml_string(SPRING_MASS.format(step_s=step_s, actuator=MUSCLE))
     data, energy_meter = mujoco.MjData(model), EnergyMeter(model, RINGS)

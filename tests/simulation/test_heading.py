@@ -15,7 +15,6 @@ from annelid.analysis import summary
 from annelid.analysis.gait import gait, slip_cost
 from annelid.analysis.track import track_of
 from annelid.body.assemble import mjcf_text
-from annelid.draw.camera import VIEWS_DEG, view_angles
 from annelid.environments import WormEnv
 from annelid.errors import ConfigError
 from annelid.morphology import heading_turn
@@ -70,15 +69,16 @@ def test_the_turn_of_a_heading_is_to_the_worm_s_left() -> None:
     assert heading_turn(30.0) @ ahead == pytest.approx([-np.sqrt(0.75), -0.5, 0.0])
 
 
-@pytest.mark.parametrize("changes", FORMULATIONS.values(), ids=FORMULATIONS)
-@pytest.mark.parametrize(("heading", "near"), [(-180.0, 1e-9), (90.0, 5e-4)])
-def test_a_turned_worm_moves_and_feels_as_one_that_is_not(heading: float, near: float, changes: dict[str, Any]) -> None:
+@pytest.mark.parametrize(
+    ("kind", "heading", "near"), [("rods", -180.0, 1e-9), ("chain", 90.0, 5e-4), ("setae", 90.0, 5e-4)]
+)
+def test_a_turned_worm_moves_and_feels_as_one_that_is_not(kind: str, heading: float, near: float) -> None:
     """By half and quarter turns, for which pyramids of friction are the same.
 
     Rods do not quite: how hard the engine holds the length of an edge depends on where that points. Nor does a chain,
     whose solver visits its turned pyramids in another order and ends before it has converged.
     """
-    near = 5e-4 if changes.get("body.formulation.kind") == "chain" else near
+    changes = FORMULATIONS[kind]
     (straight, touched), (leading, touched_so) = worm(0.0, **changes), worm(heading, **changes)
     first, other, turn = straight.observe(), leading.observe(), heading_turn(heading)
     assert np.ptp(first.ring_length_m) > 0.05, "it must have moved"
@@ -182,8 +182,3 @@ def test_an_environment_counts_its_way_where_the_worm_leads() -> None:
         told.append([(reward, info["travel"], *observation) for observation, reward, _, _, info in steps])
     assert np.abs(np.array(told[0])[:, 1]).max() > 1e-3
     assert np.array(told[1]) == pytest.approx(np.array(told[0]), abs=1e-6)
-
-
-def test_views_turn_with_the_worm_but_for_those_that_stand_still() -> None:
-    assert view_angles("side", 30.0) == (VIEWS_DEG["side"][0] + 30.0, VIEWS_DEG["side"][1])
-    assert view_angles("course", 30.0) == VIEWS_DEG["course"]

@@ -13,11 +13,9 @@ from annelid.config import RunConfig
 from annelid.errors import ConfigError, RunFileError, SimulationStopped
 from annelid.simulation import Run, loop, open_run, simulate
 from annelid.simulation.checkpoint import (
-    Checkpoint,
     generator_state,
     newest_payload,
     restore_generator,
-    slot_capacity,
     to_slot,
 )
 from annelid.simulation.runfile import read_checkpoint
@@ -186,12 +184,6 @@ def test_a_write_cut_off_anywhere_leaves_a_whole_checkpoint(old: bytes, new: byt
     assert found == (new if torn.startswith(written) else b"before")
 
 
-def test_slots_never_written_hold_nothing() -> None:
-    assert newest_payload([bytes(1000), bytes(1000)]) is None
-    assert newest_payload([b"", b"abc"]) is None
-    assert slot_capacity(b"x" * 1000) >= len(to_slot(1, b"x" * 1000))
-
-
 @given(seed=st.integers(0, 2**64), draws=st.integers(0, 5))
 def test_a_restored_generator_draws_the_same_numbers(seed: int, draws: int) -> None:
     generator = np.random.Generator(np.random.PCG64(seed))
@@ -203,21 +195,3 @@ def test_a_restored_generator_draws_the_same_numbers(seed: int, draws: int) -> N
         copy.integers(0, 2**20, 3, dtype=np.uint32), generator.integers(0, 2**20, 3, dtype=np.uint32)
     )
     np.testing.assert_array_equal(copy.normal(size=10), generator.normal(size=10))
-
-
-def test_a_checkpoint_survives_packing() -> None:
-    plant, controller = SavedToyPlant(), ToyController()
-    sensation = plant.reset(1)
-    controller.reset(2)
-    noise = generator_state(np.random.Generator(np.random.PCG64(0)))
-    saved = Checkpoint(17, sensation, noise, plant.get_state(), controller.get_state())
-    again = Checkpoint.from_bytes(saved.to_bytes())
-    assert again.step == 17
-    assert again.sensation.time_s == sensation.time_s
-    np.testing.assert_array_equal(again.sensation.center_of_mass_m, sensation.center_of_mass_m)
-    np.testing.assert_array_equal(again.noise, noise)
-    for ours, theirs in ((again.plant, saved.plant), (again.controller, saved.controller)):
-        assert ours.keys() == theirs.keys()
-        for key, value in theirs.items():
-            assert ours[key].dtype == np.asarray(value).dtype
-            np.testing.assert_array_equal(ours[key], value)

@@ -125,11 +125,3 @@ def test_a_run_in_another_thread_needs_no_signals(tmp_path: Path) -> None:
     thread.start()
     thread.join(60)
     assert open_run(tmp_path).status == "complete"
-
-
-@pytest.mark.slow
-def test_these_tests_pass_where_interruptions_are_ignored() -> None:
-    """As under nohup, or in the background of a script."""
-    words = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", __file__, "-k", "interrupted"]
-    ignored = subprocess.Popen(words, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_IGN))
-    assert ignored.wait(timeout=300) == 0

@@ -137,12 +137,6 @@ def test_soft_crossings_do_not_shake() -> None:
     assert 0.0 < float(worm.energies.damping_loss) < float(worm.energies.muscle_work.sum())
 
 
-def test_the_reference_of_rows_stays_where_it_is() -> None:
-    worm = plant("riddle2023-rods", **COARSE)
-    worm.move(np.array([0.0, 0.5, 0.0]), 20)
-    assert abs(worm.qpos[worm.model.joint("row_reference").qposadr[0]]) < 1e-12
-
-
 def test_rods_without_damping_keep_swinging() -> None:
     worm = plant("riddle2023-rods", **{**COARSE, **AFLOAT, "body.strands.damping_time_s": 0.0})
     worm.move(np.array([0.0, 0.3, 0.0]), 10)

@@ -86,20 +86,3 @@ def test_contact_sensors_change_nothing_in_the_motion() -> None:
     mujoco.mj_step(plain, data, 10)
     assert np.array_equal(plant.data.qpos, data.qpos)
     assert plant.model.nsensor > plain.nsensor
-
-
-def test_a_stride_equals_its_control_steps() -> None:
-    config = load_config("riddle2023-rods", SMALL | {"clock.physics_timestep_s": 0.01})
-    steps, strides = WormPlant(config), WormPlant(config)
-    steps.reset(0)
-    strides.reset(0)
-    random = np.random.default_rng(0)
-    for n in (3, 7, 10, 1, 9):
-        assert n <= strides.steps_to_move()
-        pulls = random.uniform(size=(n, 3))
-        *_, one = (steps.step(pull) for pull in pulls)
-        many = strides.stride(pulls)
-        assert one.time_s == many.time_s
-        assert np.array_equal(one.stretch_m, many.stretch_m)
-        assert np.array_equal(steps.qpos, strides.qpos)
-    assert strides.data.time == pytest.approx(0.03)

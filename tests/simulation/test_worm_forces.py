@@ -112,15 +112,3 @@ def test_rest_lengths_of_the_sensors_do_not_depend_on_the_kind_of_spring() -> No
     felt = slack.reset(0)
     assert felt.rest_stretch_m == pytest.approx(slack.geometry.spring_length_m[slack.geometry.sensor_springs])
     assert felt.stretch_m == pytest.approx(felt.rest_stretch_m)
-
-
-def test_the_height_guard_watches_the_highest_crossing() -> None:
-    plant = worm(**{"guard.height_m": 0.25})
-    plant.step(np.zeros(3))
-    alarm = plant.alarm()
-    assert alarm is not None
-    assert "height of a crossing is 0.3" in alarm
-
-
-def test_the_engine_may_not_reset_a_worm_that_blew_up() -> None:
-    assert worm().model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_AUTORESET

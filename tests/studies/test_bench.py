@@ -6,7 +6,6 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-import mujoco
 import numpy as np
 import pytest
 from hypothesis import given
@@ -14,12 +13,11 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from annelid.cli import app
-from annelid.config import LEVELS, load_config
+from annelid.config import load_config
 from annelid.errors import ConfigError, RunFileError
 from annelid_studies.bench import benchmark as store_module
 from annelid_studies.bench.benchmark import (
     JSON_NAME,
-    QUANTITIES,
     MeasurementFailed,
     Measurements,
     bench,
@@ -29,20 +27,18 @@ from annelid_studies.bench.benchmark import (
     judge,
     slowdowns,
 )
-from annelid_studies.bench.cases import JUDGED_S, LINES, N_PERTURBED, BenchCase, bench_cases, converged, judged, timed
-from annelid_studies.bench.measure import measure, peak_memory_bytes
+from annelid_studies.bench.cases import LINES, N_PERTURBED, BenchCase, bench_cases, judged, timed
+from annelid_studies.bench.measure import measure
 from annelid_studies.bench.report import bench_figure, bench_table
 from annelid_studies.bench.timing import (
     ENGINE_PHASES,
     PHASES,
-    YARDSTICK,
     EngineTimes,
     Stopwatch,
     laps_s,
     shares,
-    yardstick_ms,
 )
-from annelid_studies.worms import CHAIN, FAST, RODS
+from annelid_studies.worms import CHAIN, RODS
 
 positive = st.floats(1e-3, 1e3)
 
@@ -84,19 +80,10 @@ class TestSlowdowns:
         with pytest.raises(RunFileError, match="no case in common"):
             slower(timings(a=(1.0, 1.0)), timings(b=(1.0, 1.0)))
 
-    @pytest.mark.parametrize("before", [{}, [], {"cases": [1]}, {"cases": []}, timings(a=(1.0, None))])
-    def test_what_is_no_benchmark_is_refused(self, before: Any) -> None:
-        with pytest.raises(RunFileError, match=r"must be a bench\.json|measure it again"):
-            in_yardsticks(before)
-
-    def test_the_yardstick_moves_and_touches_the_ground(self) -> None:
-        model = mujoco.MjModel.from_xml_string(YARDSTICK)
-        data = mujoco.MjData(model)
-        mujoco.mj_step(model, data, 200)
-        assert np.isfinite(data.qpos).all()
-        assert np.abs(data.qvel).max() > 1e-3
-        assert data.ncon > 0
-        assert yardstick_ms(0.01) > 0.0
+    def test_what_is_no_benchmark_is_refused(self) -> None:
+        for before in ({}, [], {"cases": [1]}, {"cases": []}, timings(a=(1.0, None))):
+            with pytest.raises(RunFileError, match=r"must be a bench\.json|measure it again"):
+                in_yardsticks(before)  # pyright: ignore[reportArgumentType]
 
     def test_what_is_no_benchmark_is_refused_before_anything_is_measured(self, tmp_path: Path) -> None:
         (tmp_path / "other.json").write_text('{"cases": []}')
@@ -112,11 +99,6 @@ def error(measured: dict[str, Any], reference: dict[str, Any]) -> dict[str, floa
 
 
 class TestErrors:
-    @given(positive, positive, positive, positive)
-    def test_a_run_has_no_error_against_itself(self, elongation: float, period: float, travel: float, work: float):
-        same = numbers(elongation, period, travel, work)
-        assert error(same, same) == dict.fromkeys([*QUANTITIES, "largest"], 0.0)
-
     @given(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5))
     def test_the_larger_of_elongation_and_period_counts(self, a: float, b: float) -> None:
         found = error(numbers(elongation=0.08 * (1 + a), period=2.6 * (1 + b)), numbers())
@@ -129,31 +111,25 @@ class TestErrors:
         assert (found["travel"], found["work"]) == (pytest.approx(0.5), pytest.approx(0.25))
         assert found["slip"] == pytest.approx(1.0 / 3.0), "path over travel: 1 instead of 1.5"
 
-    @pytest.mark.parametrize(
-        "missing", ["period_s", "elongation_mean_max_m", "travel_m", "travel_path_m", "muscle_work_J"]
-    )
-    def test_what_is_missing_is_unknown_and_not_small(self, missing: str) -> None:
-        for found in (error(numbers() | {missing: None}, numbers()), error(numbers(), numbers() | {missing: None})):
-            assert (found["largest"] is None) == (missing in ("period_s", "elongation_mean_max_m"))
-            n_unknown = 1 if missing in ("travel_path_m", "muscle_work_J") else 2
-            assert list(found.values()).count(None) == n_unknown
+    def test_what_is_missing_is_unknown_and_not_small(self, subtests: pytest.Subtests) -> None:
+        for missing in ("period_s", "elongation_mean_max_m", "travel_m", "travel_path_m", "muscle_work_J"):
+            with subtests.test(f"{missing!r:.60}"):
+                for found in (
+                    error(numbers() | {missing: None}, numbers()),
+                    error(numbers(), numbers() | {missing: None}),
+                ):
+                    assert (found["largest"] is None) == (missing in ("period_s", "elongation_mean_max_m"))
+                    n_unknown = 1 if missing in ("travel_path_m", "muscle_work_J") else 2
+                    assert list(found.values()).count(None) == n_unknown
 
     def test_one_unknown_segment_makes_the_elongation_unknown(self) -> None:
         found = error(numbers() | {"elongation_mean_max_m": [0.08, None]}, numbers())
         assert (found["elongation"], found["period"]) == (None, 0.0)
 
-    def test_perturbed_runs_are_compared_in_pairs(self) -> None:
-        pairs = errors([numbers(0.08), numbers(0.04)], [numbers(0.08), numbers(0.05)])
-        assert pairs["elongation"] == [0.0, pytest.approx(0.2)]
-
 
 @given(st.floats(0.5, 3.0), positive, st.lists(st.integers(1, 100), min_size=2, unique=True))
 def test_exponent_of_a_power_law(power: float, factor: float, sizes: list[int]) -> None:
     assert exponent(sizes, [factor * n**power for n in sizes]) == pytest.approx(power, abs=1e-6)
-
-
-def test_one_size_has_no_exponent() -> None:
-    assert exponent([3, 3], [1.0, 2.0]) is None
 
 
 class TestTiming:
@@ -211,52 +187,6 @@ class TestCases:
         full = {case.name: case.case.config for case in bench_cases("full")}
         for case in bench_cases("quick"):
             assert full[case.name] == case.case.config
-
-    def test_all_levels_are_among_the_cases(self) -> None:
-        entries = judge(cases := bench_cases("quick", ["levels"]), {case.name: {"failed": "-"} for case in cases})
-        assert set(entries["levels"]) == set(LEVELS)
-        by_name = {case.name: case for case in cases}
-        for level, name in entries["levels"].items():
-            assert by_name[name].case.config == load_config(RODS, {**LEVELS[level].changes, "duration_s": JUDGED_S})
-
-    def test_presets_are_timed_as_they_are(self) -> None:
-        timed_only = {case.case.preset: case for case in bench_cases("quick", ["levels"]) if case.kind == "speed"}
-        assert set(timed_only) == {CHAIN, FAST, "riddle2025-muscles"}
-        for preset, case in timed_only.items():
-            assert case.case.config == load_config(preset)
-
-    @pytest.mark.parametrize("effort", ["quick", "full"])
-    def test_one_converged_run_is_there_where_something_is_judged(self, effort: Any) -> None:
-        for lines, finest in (None, [converged()]), (["steps"], [converged()]), (["segments", "chain"], []):
-            assert [case for case in bench_cases(effort, lines) if case.kind == "converged"] == finest
-
-    def test_steps_are_of_the_presets_mesh(self) -> None:
-        configs = [case.case.config for case in bench_cases("full", ["steps"]) if case.kind == "judged"]
-        assert all(config.body == load_config(RODS).body for config in configs)
-        assert [1e3 * config.clock.physics_timestep_s for config in configs] == pytest.approx([1, 2, 5, 10, 20, 40])
-
-    def test_the_converged_run_differs_in_step_contact_and_sampling_only(self) -> None:
-        four = {"body.mesh.elements_per_side": 4, "clock.physics_timestep_s": 0.02}
-        fine, coarse = converged().case.config, judged(four, "steps").case.config
-        body = fine.body.model_dump()
-        assert body["formulation"].pop("friction_impedance_ratio") == 1000.0
-        other = coarse.body.model_dump()
-        other["formulation"].pop("friction_impedance_ratio")
-        assert body == other
-        assert fine.clock.physics_timestep_s == 0.001
-        assert fine.clock.control_timestep_s == coarse.clock.control_timestep_s == 0.001
-        assert (fine.controller, fine.sensor, fine.arena) == (coarse.controller, coarse.sensor, coarse.arena)
-
-    def test_perturbed_runs_differ_in_friction_and_seed_only(self) -> None:
-        case = judged({}, "steps")
-        for one in case.perturbed:
-            config = case.case.config
-            assert one.arena is not None
-            assert config.arena is not None
-            assert 0.0 < abs(one.arena.friction - config.arena.friction) <= 0.01
-            same = {"arena": config.arena, "seed": config.seed}
-            assert one.model_copy(update=same) == config
-        assert timed(RODS, 3, 1.0, "duration").perturbed == []
 
     def test_an_unknown_line_is_refused(self) -> None:
         with pytest.raises(ConfigError, match="did you mean 'segments'"):
@@ -406,15 +336,6 @@ def test_finer_physics_than_control_counts_single_steps() -> None:
     assert 0.0 < found["step_mean_ms"] * 38 <= 1e3 * found["wall_s"]
 
 
-def test_peak_memory_grows_by_what_is_allocated() -> None:
-    before = peak_memory_bytes()
-    assert before is not None
-    block = np.ones((before + 100_000_000) // 8)
-    after = peak_memory_bytes()
-    assert after is not None
-    assert after >= block.nbytes > before
-
-
 class TestPicture:
     def report(self, lines: list[str] | None = None) -> dict[str, Any]:
         """All measured alike, but that no judged run is exact and steps of 40 ms lose the order."""
@@ -435,7 +356,7 @@ class TestPicture:
         for words in (*words_of_all, "Elongation", "Slip", "steps in ms", "processor time than riddle2023"):
             assert f"<!-- {words}" in text or words in text, words
 
-    @pytest.mark.parametrize("lines", [["chain"], ["levels"], ["duration"], ["steps"]])
+    @pytest.mark.parametrize("lines", [["chain"], ["levels"], ["steps"]])
     def test_leaves_out_what_was_not_measured(self, tmp_path: Path, lines: list[str]) -> None:
         text = bench_figure(self.report(lines), tmp_path / "bench").with_suffix(".svg").read_text()
         assert ("Cost of a step" in text) == (lines == ["chain"])

@@ -58,12 +58,6 @@ def test_an_unknown_line_is_one_sentence(annelid: Command) -> None:
     assert not list(Path().iterdir())
 
 
-def test_a_file_in_the_way_is_kept(annelid: Command, asked: Asked) -> None:
-    Path("bench").write_text("mine")
-    assert "bench is a file" in annelid("study", "bench").sentence()
-    assert asked == []
-
-
 def test_ctrl_c_tells_how_to_go_on(annelid: Command, asked: Asked, monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted(*_: object, **__: object) -> Path:
         raise KeyboardInterrupt
@@ -77,10 +71,3 @@ def test_ctrl_c_tells_how_to_go_on(annelid: Command, asked: Asked, monkeypatch: 
     again = shlex.split(done.sentence().partition("go on with: ")[2])
     assert again == ["annelid", "study", "bench", *arguments]
     assert annelid(*again[1:]).exit_code == 0
-
-
-def test_help_names_every_line(annelid: Command) -> None:
-    from annelid_studies.bench.cases import LINES
-
-    text = annelid("study", "bench", "--help").out
-    assert all(f"--cases {line} " in text for line in LINES)

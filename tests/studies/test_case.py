@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from annelid.body.worm import WormBody
 from annelid.config import RunConfig, load_config, parse_assignments
 from annelid.control.open_loop import Program
 from annelid.experiment.case import Case
@@ -83,10 +82,6 @@ def test_recording_is_sparse_unless_the_case_says_otherwise() -> None:
     assert own.signals_interval_s == usual.signals_interval_s
 
 
-def test_recording_is_no_part_of_a_command() -> None:
-    assert Case(RODS, {"record.frames_interval_s": 0.1}).command == f"annelid run {RODS}"
-
-
 def test_further_changes_win() -> None:
     case = Case(RODS, {"seed": 1, "arena.friction": 0.3}).but({"seed": 2})
     assert (case.config.seed, case.preset) == (2, RODS)
@@ -97,13 +92,6 @@ def test_the_chain_is_the_papers_at_twice_the_step() -> None:
     ours, published = chain().config.model_dump(exclude={"record"}), load_config(CHAIN).model_dump(exclude={"record"})
     assert ours.pop("clock")["physics_timestep_s"] == 2 * published.pop("clock")["physics_timestep_s"]
     assert ours == published
-
-
-def test_the_rods_have_the_papers_mesh() -> None:
-    ours, papers = rods().config.body, load_config(CHAIN).body
-    assert isinstance(ours, WormBody)
-    assert isinstance(papers, WormBody)
-    assert ours.mesh.elements_per_side == papers.mesh.elements_per_side
 
 
 def test_costs_order_the_runs_by_their_work() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from dataclasses import replace
 from math import isnan, nan
 from pathlib import Path
@@ -15,7 +16,7 @@ from annelid.errors import ConfigError, RunFileError
 from annelid.experiment import Store
 from annelid.protocols import Array, Controller, Plant, Sensation
 from annelid_studies.challenge import report, scores, tasks
-from annelid_studies.challenge.ranking import ALL, agreement, interval, mean_speeds, standings
+from annelid_studies.challenge.ranking import ALL, agreement, mean_speeds, standings
 from annelid_studies.challenge.scores import Score, challenge, electric_energy_J, read_scores
 from annelid_studies.challenge.tasks import REFERENCE, Entrant, all_tasks, entries, find_entrants
 
@@ -41,37 +42,41 @@ def test_draws_of_a_version_stay_what_they_are() -> None:
     assert found.drawn("delay", 1001) == {"trial.delay_s": 0.05559, "arena.friction": 0.6012}
 
 
-@pytest.mark.parametrize("name", all_tasks().tasks)
-def test_draws_lie_in_their_range_and_differ_by_seed(name: str) -> None:
-    task, seeds = all_tasks().tasks[name], range(40)
-    draws = [all_tasks().drawn(name, seed) for seed in seeds]
-    # A friction that is drawn within 1 % only has few values, as it is rounded.
-    assert len({str(each) for each in draws}) > len(seeds) / 4
-    for field, among in task.draw.items():
-        values = np.array([abs(each[field]) for each in draws])
-        spread = 0.01 if field == "arena.friction" else 0.0
-        assert np.all((values >= among.low * (1 - spread) - 1e-9) & (values <= among.high * (1 + spread) + 1e-9))
-        if among.either_side:
-            assert {np.sign(each[field]) for each in draws} == {-1.0, 1.0}
-    if "arena.friction" not in task.draw:
-        friction = {**all_tasks().set, **task.set}["arena.friction"]
-        assert all(abs(each["arena.friction"] / friction - 1.0) <= 0.0101 for each in draws)
+def test_draws_lie_in_their_range_and_differ_by_seed(subtests: pytest.Subtests) -> None:
+    for name in all_tasks().tasks:
+        with subtests.test(f"{name!r:.60}"):
+            task, seeds = all_tasks().tasks[name], range(40)
+            draws = [all_tasks().drawn(name, seed) for seed in seeds]
+            # A friction that is drawn within 1 % only has few values, as it is rounded.
+            assert len({str(each) for each in draws}) > len(seeds) / 4
+            for field, among in task.draw.items():
+                values = np.array([abs(each[field]) for each in draws])
+                spread = 0.01 if field == "arena.friction" else 0.0
+                assert np.all(
+                    (values >= among.low * (1 - spread) - 1e-9) & (values <= among.high * (1 + spread) + 1e-9)
+                )
+                if among.either_side:
+                    assert {np.sign(each[field]) for each in draws} == {-1.0, 1.0}
+            if "arena.friction" not in task.draw:
+                friction = {**all_tasks().set, **task.set}["arena.friction"]
+                assert all(abs(each["arena.friction"] / friction - 1.0) <= 0.0101 for each in draws)
 
 
-@pytest.mark.parametrize("name", all_tasks().tasks)
-def test_a_task_makes_blind_runs_whose_step_can_be_halved(name: str) -> None:
-    reference = {REFERENCE: find_entrants([])[REFERENCE]}
-    [whole], [half] = (entries(reference, [name], [1000], finer=finer) for finer in (1, 2))
-    config = whole.case.config
-    assert config.trial is not None
-    assert config.trial.blind
-    assert half.case.config.clock.physics_timestep_s == config.clock.physics_timestep_s / 2
-    assert half.case.config.clock.control_timestep_s == config.clock.control_timestep_s
-    event_s = all_tasks().tasks[name].event_s
-    if event_s is not None:
-        ends = [config.trial.weak_from_s, config.trial.silent_s, config.trial.random_s]
-        ends.append(config.trial.push_from_s + config.trial.push_s if config.trial.push_N else 0.0)
-        assert max(ends) == event_s
+def test_a_task_makes_blind_runs_whose_step_can_be_halved(subtests: pytest.Subtests) -> None:
+    for name in all_tasks().tasks:
+        with subtests.test(f"{name!r:.60}"):
+            reference = {REFERENCE: find_entrants([])[REFERENCE]}
+            [whole], [half] = (entries(reference, [name], [1000], finer=finer) for finer in (1, 2))
+            config = whole.case.config
+            assert config.trial is not None
+            assert config.trial.blind
+            assert half.case.config.clock.physics_timestep_s == config.clock.physics_timestep_s / 2
+            assert half.case.config.clock.control_timestep_s == config.clock.control_timestep_s
+            event_s = all_tasks().tasks[name].event_s
+            if event_s is not None:
+                ends = [config.trial.weak_from_s, config.trial.silent_s, config.trial.random_s]
+                ends.append(config.trial.push_from_s + config.trial.push_s if config.trial.push_N else 0.0)
+                assert max(ends) == event_s
 
 
 def test_all_entrants_run_in_the_same_conditions() -> None:
@@ -85,23 +90,22 @@ def test_all_entrants_run_in_the_same_conditions() -> None:
     assert periods[1] == pytest.approx(4 * periods[0])
 
 
-@pytest.mark.parametrize(
-    ("text", "says"),
-    [
+def test_an_entrant_that_was_tuned_on_tests_or_changes_the_task_is_refused(
+    subtests: pytest.Subtests, tmp_path: Path
+) -> None:
+    for text, says in (
         ("[mine]\ncontroller.kind = 'sine'\ntuned_on = [0, 1000, 1003]", "mine: .*all tasks: 1000, 1003"),
         ("[mine]\ncontroller.kind = 'sine'\ntuned_on.slope = [7, 2001]", "slope: 2001"),
         ("[mine]\ncontroller.kind = 'sine'\narena.friction = 5.0", "arena"),
         ("[mine]\ncontroller.kind = 'sine'\nguard.depth_m = 1.0", "guard"),
         ("[timed]\ncontroller.kind = 'sine'", "another entrant 'timed'"),
         ("mine = 3", "mine is no table"),
-    ],
-)
-def test_an_entrant_that_was_tuned_on_tests_or_changes_the_task_is_refused(
-    text: str, says: str, tmp_path: Path
-) -> None:
-    (tmp_path / "mine.toml").write_text(text)
-    with pytest.raises(ConfigError, match=says):
-        find_entrants([str(tmp_path / "mine.toml")])
+    ):
+        with subtests.test(f"{text!r:.60}"):
+            folder = Path(tempfile.mkdtemp(dir=tmp_path))
+            (folder / "mine.toml").write_text(text)
+            with pytest.raises(ConfigError, match=says):
+                find_entrants([str(folder / "mine.toml")])
 
 
 def test_unknown_names_are_refused_with_the_nearest() -> None:
@@ -187,18 +191,6 @@ def test_the_ranking_is_the_mean_of_ratios_over_tasks() -> None:
     assert 0.0 < found["mine", ALL].robust_low < 0.5 < found["mine", ALL].robust_high < 1.0
 
 
-def test_tasks_draws_are_independent_so_that_many_tasks_narrow_the_interval() -> None:
-    """A mean over n tasks varies by a factor of the root of n less than that over one."""
-    rng, widths = np.random.default_rng(0), []
-    for n_tasks in (1, 25):
-        values = rng.normal(size=(40, n_tasks, 1))
-        mean, low, high = interval(values, lambda means: means[..., 0].mean(axis=-1))
-        assert mean == pytest.approx(values.mean())
-        widths.append(high - low)
-    assert widths[0] == pytest.approx(2 * 1.96 / 40**0.5, rel=0.3)
-    assert widths[1] == pytest.approx(widths[0] / 5, rel=0.3)
-
-
 def test_runs_in_time_have_their_entrants_own_period() -> None:
     periods = (1.2, 1.25, 1.25, 1.4, 2.5, 1.25)
     rows = [replace(SCORE, seed=seed, period_s=period) for seed, period in enumerate(periods)]
@@ -242,21 +234,20 @@ def test_rankings_agree_or_are_reversed(tmp_path: Path) -> None:
     assert agreement(mean_speeds(reversed_rows), again) == {"slope": pytest.approx(-1.0)}
 
 
-@pytest.mark.parametrize(
-    ("before", "after", "says"),
-    [
+def test_a_strangers_scores_are_numbers_or_refused(subtests: pytest.Subtests, tmp_path: Path) -> None:
+    for before, after, says in (
         ("entrant,", "name,", r"row 0, entrant: "),
         ("0.05", "fast", r"row 0, speed_m_per_s: "),
         ("0.05", "nan", r"row 0, speed_m_per_s: .*finite"),
         ("slope,2,", "slope,7,", r"version 7 of the tasks; here it is 2"),
         ("slope", "slope,more", r"no runs\.csv"),
-    ],
-)
-def test_a_strangers_scores_are_numbers_or_refused(before: str, after: str, says: str, tmp_path: Path) -> None:
-    path = report.write_rows(Score, [SCORE], tmp_path / "runs.csv")
-    path.write_text(path.read_text().replace(before, after, 1))
-    with pytest.raises(RunFileError, match=says):
-        read_scores(path)
+    ):
+        with subtests.test(f"{before!r:.60}"):
+            folder = Path(tempfile.mkdtemp(dir=tmp_path))
+            path = report.write_rows(Score, [SCORE], folder / "runs.csv")
+            path.write_text(path.read_text().replace(before, after, 1))
+            with pytest.raises(RunFileError, match=says):
+                read_scores(path)
 
 
 @pytest.mark.usefixtures("short")

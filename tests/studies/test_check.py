@@ -24,9 +24,8 @@ PLANAR = {"duration_s": 3.0}
 
 
 @pytest.fixture(scope="module")
-def planar(tmp_path_factory: pytest.TempPathFactory) -> Outcome:
-    config = load_config("riddle2022-planar", PLANAR)
-    return outcome(simulate(config, tmp_path_factory.mktemp("planar") / "run", progress=False))
+def planar(planar_run: Run) -> Outcome:
+    return outcome(planar_run)
 
 
 def of(run: Outcome, **numbers: Any) -> Outcome:

@@ -40,9 +40,8 @@ class Told(Evidence):
         self.__dict__["runs"] = [(made, None)]
 
 
-@pytest.mark.parametrize(
-    ("ours", "paper", "expected"),
-    [
+def test_a_number_is_judged_by_all_of_its_readings(subtests: pytest.Subtests) -> None:
+    for ours, paper, expected in (
         ((2.5,), 2.5, ("holds", "")),
         ((2.51, 2.49), 2.5, ("holds", "")),
         ((2.6, 2.5), 2.5, ("holds within", "4.0 %")),
@@ -53,12 +52,9 @@ class Told(Evidence):
         ((nan,), 2.5, ("does not hold", "")),
         (SIX_SPRINGS, 0.394, ("rests on", "the spring")),
         (SIX_SPRINGS[:1], 0.394, ("holds within", "0.5 %")),
-    ],
-)
-def test_a_number_is_judged_by_all_of_its_readings(
-    ours: tuple[float, ...], paper: float, expected: tuple[str, str]
-) -> None:
-    assert near(ours, paper, "the spring") == expected
+    ):
+        with subtests.test(f"{ours!r:.60}"):
+            assert near(ours, paper, "the spring") == expected
 
 
 def test_a_property_holds_where_all_have_it() -> None:
@@ -74,21 +70,18 @@ def test_no_time_of_computing_enters_a_verdict(made: Outcome) -> None:
         assert cost_claim(Told({}, "quick", timed, fast)).verdict == "not testable here"
 
 
-@pytest.mark.parametrize("effort", ["quick", pytest.param("full", marks=pytest.mark.slow)])
 def test_claims_find_their_numbers_and_miss_none_silently(
-    effort: Effort, made: Outcome, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    made: Outcome, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    findings = {
-        each.name: found(each, effort, made, tmp_path, monkeypatch) for each in EXAMINATIONS if each.name in READ
-    }
+    findings = {each.name: found(each, made, tmp_path, monkeypatch) for each in EXAMINATIONS if each.name in READ}
     renamed = {
         name: replace(each, numbers={f"{number}_new": value for number, value in each.numbers.items()})
         for name, each in findings.items()
     }
     for claim in READERS:
-        assert claim(Told(findings, effort, made)).verdict != "not testable here"
+        assert claim(Told(findings, "quick", made)).verdict != "not testable here"
         with pytest.raises(KeyError, match=r"has no number '.*did you mean .*_new'.* Valid: "):
-            claim(Told(renamed, effort, made))
+            claim(Told(renamed, "quick", made))
 
 
 def test_numbers_stay_complete_when_they_are_kept_and_read_back() -> None:
@@ -104,10 +97,8 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Outcome:
     return outcome(simulate(rods({"duration_s": 0.02}).config, folder, progress=False))
 
 
-def found(
-    examination: Examination, effort: Effort, made: Outcome, folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> Findings:
+def found(examination: Examination, made: Outcome, folder: Path, monkeypatch: pytest.MonkeyPatch) -> Findings:
     """What an examination says of runs that all end alike, without its figure."""
     monkeypatch.setattr(f"annelid_studies.riddle2023.examinations.{examination.name}._draw", lambda *_: None)
-    runs = results(examination, effort, lambda case: synthetic(made, case, 0.4, WAVE))
-    return examination.examine(runs, effort, folder / examination.name)
+    runs = results(examination, "quick", lambda case: synthetic(made, case, 0.4, WAVE))
+    return examination.examine(runs, "quick", folder / examination.name)

@@ -13,7 +13,6 @@ from annelid.config import load_config
 from annelid.errors import ConfigError
 from annelid.experiment.tune import Judged
 from annelid_studies.crawling import (
-    PERTURBED,
     VALUES,
     Headline,
     Reading,
@@ -21,33 +20,22 @@ from annelid_studies.crawling import (
     crawling_table,
     headline_table,
     runs,
-    variants,
     write_figure,
     write_headlines,
     write_readings,
 )
-from annelid_studies.worms import FRICTION_SPREAD
 
 MUSCLES, SERVOS = "riddle2025-muscles", "riddle2025"
 
 
-@pytest.mark.parametrize("n_segments", [3, 6, 12])
-@pytest.mark.parametrize("gait", [MUSCLES, SERVOS])
-def test_longer_worms_have_rings_as_strong_as_the_second_and_ends_as_before(gait: str, n_segments: int) -> None:
-    body = load_config(gait, changes_for(gait, "segments", n_segments)).body
-    assert isinstance(body, WormBody)
-    forces = body.rings.forces(n_segments)
-    assert forces == [16.0, *[31.0] * (n_segments - 2), 16.0]
-
-
-def test_a_long_worm_is_watched_in_proportion_and_a_short_one_no_shorter() -> None:
-    before = load_config(MUSCLES).duration_s
-    after = {n: load_config(MUSCLES, changes_for(MUSCLES, "segments", n)).duration_s for n in (3, 6, 12)}
-    assert after == {3: before, 6: before, 12: 2.0 * before}
-
-
-def test_a_ground_changes_nothing_but_friction() -> None:
-    assert changes_for(MUSCLES, "friction", 0.05) == {"arena.friction": 0.05}
+def test_longer_worms_have_rings_as_strong_as_the_second_and_ends_as_before(subtests: pytest.Subtests) -> None:
+    for gait in (MUSCLES, SERVOS):
+        for n_segments in (3, 6, 12):
+            with subtests.test(f"{gait!r:.60}, {n_segments!r:.60}"):
+                body = load_config(gait, changes_for(gait, "segments", n_segments)).body
+                assert isinstance(body, WormBody)
+                forces = body.rings.forces(n_segments)
+                assert forces == [16.0, *[31.0] * (n_segments - 2), 16.0]
 
 
 def test_planar_worms_are_refused() -> None:
@@ -98,39 +86,6 @@ def test_the_figure_and_the_tables_take_gaits_that_do_not_walk(tmp_path: Path) -
         assert crawling_table(readings(), quantity).row_count == 2 * len(values["quick"])
 
 
-def test_a_reading_s_number_is_its_gait_s() -> None:
-    gait = Gait(cycles=3, speed_m_per_s=0.1, cost_of_transport=1.5)
-    walks, rests = (Reading(MUSCLES, "friction", 0.7, Judged(gait, problem)) for problem in ("", "does not advance"))
-    assert walks.number("cost_of_transport") == 1.5
-    assert walks.number("slip_ratio") is None
-    assert rests.number("cost_of_transport") is None
-
-
-def test_perturbed_runs_differ_in_friction_and_seed_only_and_finer_ones_in_resolution_only() -> None:
-    own = load_config(MUSCLES)
-    assert isinstance(own.body, WormBody)
-    assert own.arena is not None
-    perturbed, finer = variants(MUSCLES, "full")
-    assert all(set(changes) == {"arena.friction", "seed"} for changes in perturbed)
-    changed = [changes["arena.friction"] / own.arena.friction - 1.0 for changes in perturbed]
-    assert len(set(changed)) == len({changes["seed"] for changes in perturbed}) == PERTURBED["full"]
-    assert min(changed) < 0.0 < max(changed)
-    assert all(abs(change) <= FRICTION_SPREAD + 1e-6 for change in changed)
-    configs = {what: load_config(MUSCLES, changes) for what, changes in finer.items()}
-    halves = "half_step", "quarter_step"
-    assert [configs[what].clock.physics_timestep_s for what in halves] == [0.01, 0.005]
-    # A quarter of 10 ms would be no whole number of control steps.
-    of_ten_ms = variants("crawler", "full")[1]
-    assert [of_ten_ms[what]["clock.physics_timestep_s"] for what in halves] == [0.005, 0.002]
-    counts = []
-    for what in ("element_more", "elements_more"):
-        body = configs[what].body
-        assert isinstance(body, WormBody)
-        counts.append(body.mesh.elements_per_side - own.body.mesh.elements_per_side)
-    assert counts == [1, 2]
-    assert [len(of) for of in variants(MUSCLES, "quick")] == [PERTURBED["quick"], 1]
-
-
 def headline() -> Headline:
     """Of a gait whose perturbed runs make 1, 2 and 3 m/s, but for one that stalls, and that is faster when finer."""
     walks = [Judged(Gait(cycles=3, speed_m_per_s=speed), "") for speed in (1.0, 2.0, 3.0)]
@@ -157,8 +112,3 @@ def test_a_headline_is_a_row_with_what_is_not_known_left_empty(tmp_path: Path) -
     assert float(row["speed_m_per_s_half_step"]) == pytest.approx(0.1)
     assert (row["speed_m_per_s_quarter_step"], row["slip_ratio"]) == ("", "")
     assert headline_table([headline()]).row_count == 1
-
-
-def test_a_planar_worm_has_no_headline() -> None:
-    with pytest.raises(ConfigError, match="needs a 3D worm"):
-        variants("riddle2022-planar", "full")

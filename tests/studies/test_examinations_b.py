@@ -66,10 +66,6 @@ def test_a_cell_has_one_run_for_each_seed_but_only_one_without_noise() -> None:
                 assert len({case_key(case) for case in cases}) == (chart.n_seeds if noise else 1)
 
 
-def test_the_full_map_has_five_seeds_a_cell() -> None:
-    assert {chart.n_seeds for chart in MAPS["full"]} == {5}
-
-
 def test_a_tolerance_is_steady_if_every_run_walks() -> None:
     cells = {(0.01, 0.0): [WALK], (0.02, 0.0): [LIMP], (0.01, 0.001): [WALK, SILENT], (0.02, 0.001): [WALK, LIMP]}
     assert steady_tolerances(cells, 0.0) == [0.01, 0.02]
@@ -141,8 +137,3 @@ def test_the_planar_worms_gates_draw_and_tell(tmp_path: Path, monkeypatch: pytes
     cases = {start: gate.variant(FLAT, start, "euler") for start in gate.STARTS}
     long, short = (read_beat(FLAT, start, "euler", store[case]).first_s for start, case in cases.items())
     assert long > 5 * short
-
-
-def test_the_presets_worms_are_on_the_maps() -> None:
-    tight = next(chart for chart in MAPS["full"] if chart.worm is RIGID)
-    assert case_key(tight.cell(RIGID.case(None).config.sensor.tolerance_m, 0.0)[0]) == case_key(rods())

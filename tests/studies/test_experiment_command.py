@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 
 import numpy as np
@@ -50,56 +49,20 @@ def test_results_are_kept_unless_forced(annelid: Command) -> None:
         assert Path(folder, file).read_text() == "mine"
 
 
-@pytest.mark.parametrize("study", ["weak-middle", "turning"])
-def test_a_study_needs_a_folder(annelid: Command, study: str) -> None:
-    Path("taken").write_text("mine")
-    done = annelid("study", study, "-o", "taken")
-    assert done.exit_code == 2
-    assert "taken is a file" in done.sentence()
-    assert Path("taken").read_text() == "mine"
-
-
 def test_an_unknown_figure_is_refused_with_the_nearest(annelid: Command) -> None:
     done = annelid("draw", "nowhere", "--figure", "trak")
     assert done.exit_code == 2
     assert "unknown figure 'trak': did you mean 'track'?" in done.sentence()
 
 
-@pytest.mark.slow
-def test_the_weak_middle_is_kept_and_told_again(annelid: Command) -> None:
-    first = annelid("study", "weak-middle", "--quick", "-o", "weak", "--quiet")
-    assert first.exit_code == 0, first.err
-    assert first.out.splitlines() == [str(Path("weak/weak_middle.csv")), str(Path("weak/weak_middle.png"))]
-    table = Path("weak/weak_middle.csv").read_bytes()
-    runs = {path: path.stat().st_mtime_ns for path in Path("weak/runs").glob("*/run.nc")}
-    again = annelid("study", "weak-middle", "--quick", "-o", "weak")
-    assert again.exit_code == 0, again.err
-    assert "force-limited" in again.out
-    assert Path("weak/weak_middle.csv").read_bytes() == table
-    assert {path: path.stat().st_mtime_ns for path in Path("weak/runs").glob("*/run.nc")} == runs
+STUDIES = ("weak-middle", "turning", "speed", "gaits", "slip", "slip-detector", "pipes", "riddle2025", "load-frame")
 
 
-STUDIES = ("weak-middle", "turning", "speed", "gaits", "slip", "slip-detector", "pipes", "riddle2025")
-
-
-@pytest.mark.parametrize("command", STUDIES)
-def test_a_file_in_place_of_the_folder_of_runs_is_refused(annelid: Command, command: str) -> None:
+def test_a_file_in_place_of_the_folder_of_runs_is_refused(annelid: Command, subtests: pytest.Subtests) -> None:
     Path("taken").write_text("mine", encoding="utf-8")
-    done = annelid("study", command, "-o", "taken", "--quiet")
-    assert done.exit_code != 0
-    assert "taken is a file: name a folder" in done.sentence()
-    assert Path("taken").read_text(encoding="utf-8") == "mine"
-
-
-@pytest.mark.slow
-def test_both_studies_of_slip_keep_their_runs_in_one_folder(annelid: Command) -> None:
-    done = annelid("study", "slip", "--quick", "-o", "s")
-    assert done.exit_code == 0, done.err
-    assert done.out.splitlines()[-2:] == [str(Path("s/slip.csv")), str(Path("s/slip.png"))]
-    runs = {path.name for path in Path("s/runs").iterdir()}
-    done = annelid("study", "slip-detector", "--quick", "-o", "s")
-    assert done.exit_code == 0, done.err
-    assert {path.name for path in Path("s/runs").iterdir()} > runs, "at frictions that were not drawn"
-    for row in csv.DictReader(Path("s/slip_detector.csv").read_text(encoding="utf-8").splitlines()):
-        assert float(row["precision"]) > 2 * float(row["base_rate"]), "far better than a blind guess"
-        assert float(row["recall"]) > 0.5
+    for words in [*(("study", study) for study in STUDIES), ("calibrate",), ("tune",), ("study", "bench")]:
+        with subtests.test(" ".join(words)):
+            done = annelid(*words, "-o", "taken", "--quiet")
+            assert done.exit_code != 0
+            assert "taken is a file: name a folder" in done.sentence()
+            assert Path("taken").read_text(encoding="utf-8") == "mine"

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import tempfile
 from collections.abc import Callable
-from math import pi, sqrt
+from math import sqrt
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from annelid.config import RunConfig, load_config
 from annelid.errors import AnnelidError, ConfigError
 from annelid.experiment.spread import read_spread
 from annelid_lab.calibration.base import Data
-from annelid_lab.calibration.intervals import confused, replicates
+from annelid_lab.calibration.intervals import confused
 from annelid_lab.calibration.kinds.load_frame import FrameTest
 from annelid_lab.calibration.kinds.ring_down import RingDown, first_root
 from annelid_lab.calibration.kinds.tensile import Tensile, bending_secant, stress
@@ -96,15 +97,6 @@ def test_the_moment_of_a_tube_is_that_of_its_stress_over_the_section(bore: float
     assert bending_secant(strain, softening, bore) == pytest.approx(moment, rel=1e-3)
 
 
-def test_a_linear_tube_has_the_stiffness_of_its_section() -> None:
-    tube = Tensile.model_validate(TUBE)
-    body = worm_of().body
-    assert isinstance(body, WormBody)
-    section = pi / 4 * (0.00635**2 - 0.004318**2)
-    # A solid strand of 2.99 mm bends as the tube does: the same modulus in tension and in bending.
-    assert tube.tension(worm_of(), np.array([0.01]))[0] == pytest.approx(0.3e9 * 0.01 * section, rel=2e-3)
-
-
 def test_one_law_fits_the_measured_tube_within_5_percent_up_to_3_percent_strain() -> None:
     study = load_identify_study(ROBOT)
     alone = study.model_copy(update={"experiments": study.experiments[:1]}).only(["young_modulus", "softening_strain"])
@@ -138,17 +130,6 @@ def slow_points(rng: np.random.Generator, noise: Noise, n: int = 150) -> Data:
     return Data(at, noise.root(data) @ rng.normal(size=n), data.series, data.labels, "1")
 
 
-@pytest.mark.slow
-def test_noise_and_discrepancy_are_found_again() -> None:
-    truth = Noise(0.3, 1.0, 0.5)
-    found = []
-    for seed in range(12):
-        data = slow_points(np.random.default_rng(seed), truth)
-        noise = estimated(data, data.values, np.ones((len(data.at), 1)), np.zeros((1, 1)), None)
-        found.append((noise.noise, noise.discrepancy, noise.length))
-    assert np.median(found, axis=0) == pytest.approx([0.3, 1.0, 0.5], rel=0.3)
-
-
 def test_white_noise_leaves_every_point_and_a_slow_error_few() -> None:
     data = slow_points(np.random.default_rng(0), Noise(1.0))
     assert Noise(1.0).effective_points(data) == pytest.approx(150)
@@ -179,23 +160,6 @@ def test_several_experiments_are_fitted_at_once(tmp_path: Path) -> None:
     assert ends == pytest.approx(linear, rel=0.03)
     assert not found.intervals.confused
     assert found.fit.n_tests == 0
-
-
-@pytest.mark.slow
-def test_intervals_hold_the_truth_about_as_often_as_they_say(tmp_path: Path) -> None:
-    """The cheap representative of benchmarks/identify_recovery.py: no test of a worm is simulated."""
-    inside = [
-        (ends[:, 0] < truth) & (truth < ends[:, 1])
-        for truth in [np.array([*TRUTH.values()])]
-        for ends in (both(tmp_path, seed).intervals.profile for seed in range(10))
-    ]
-    assert np.mean(inside) >= 0.8
-
-
-def test_the_bootstrap_scatters_as_the_linear_intervals(tmp_path: Path) -> None:
-    found = both(tmp_path)
-    scatter = replicates(found.fit, 4000).std(axis=0)
-    assert scatter == pytest.approx(found.intervals.relative_error, rel=0.3)
 
 
 def test_points_that_are_held_out_lie_in_their_intervals(tmp_path: Path) -> None:
@@ -351,9 +315,8 @@ def whole(table: Table) -> Table:
     return table
 
 
-@pytest.mark.parametrize(
-    ("damage", "study", "says"),
-    [
+def test_a_defect_is_refused_in_a_sentence(subtests: pytest.Subtests, tmp_path: Path) -> None:
+    cases: tuple[tuple[Callable[[Table], Table], dict[str, Any], str], ...] = (
         (renamed("force_N", "load_N"), {}, "no column 'force_N'"),
         (renamed("force_N", "force_mm"), {"tube": {"force": "force_mm"}}, "is in m, not in N"),
         (changed(force_N=lambda force: 1e3 * force), {}, "is a unit wrong"),
@@ -372,17 +335,16 @@ def whole(table: Table) -> Table:
         (whole, {"preset": "riddle2203-rods"}, "did you mean 'riddle2023-rods'"),
         (whole, {"tube": {"inner_diameter_m": 0.01}}, "must be less than outer_diameter_m"),
         (whole, {"tube": {"hold_out": [[0.0, 0.95]]}}, "points to fit"),
-    ],
-)
-def test_a_defect_is_refused_in_a_sentence(
-    damage: Callable[[Table], Table], study: dict[str, Any], says: str, tmp_path: Path
-) -> None:
-    write(tmp_path / "tube.csv", damage(tube_table(np.random.default_rng(1))))
-    tube = TUBE | study.pop("tube", {})
-    with pytest.raises(AnnelidError, match=says) as error:
-        identify(load_identify_study(study_of({"young_modulus": {}}, tube) | study), tmp_path)
-    assert len(str(error.value)) < 700
-    assert "\n" not in str(error.value)
+    )
+    for damage, study, says in cases:
+        with subtests.test(f"{damage!r:.60}"):
+            folder = Path(tempfile.mkdtemp(dir=tmp_path))
+            write(folder / "tube.csv", damage(tube_table(np.random.default_rng(1))))
+            tube = TUBE | study.pop("tube", {})
+            with pytest.raises(AnnelidError, match=says) as error:
+                identify(load_identify_study(study_of({"young_modulus": {}}, tube) | study), folder)
+            assert len(str(error.value)) < 700
+            assert "\n" not in str(error.value)
 
 
 def test_a_file_that_a_link_leads_elsewhere_is_refused(tmp_path: Path) -> None:

@@ -18,7 +18,6 @@ from annelid_studies.limit_cycle.cycle import (
     NoLimitCycle,
     Section,
     find_limit_cycle,
-    flow_of,
     kicked_phase_response,
     limit_cycle,
     section_at,
@@ -101,14 +100,6 @@ def test_hopf_normal_form_has_its_known_multipliers_and_phase_response(mu, omega
     np.testing.assert_allclose(cycle.phase_response, response, atol=0.01 * np.abs(response).max())
 
 
-def test_hopf_eigenvectors_are_tangent_and_radial():
-    _, cycle = hopf_cycle(0.5, 4.0)
-    tangent, radial = np.real(cycle.eigenvectors.T / np.linalg.norm(cycle.eigenvectors, axis=0)[:, None])
-    assert abs(tangent[0]) == pytest.approx(1.0, abs=1e-3)
-    assert abs(radial[1]) == pytest.approx(1.0, abs=1e-3)
-    np.testing.assert_allclose(cycle.monodromy @ cycle.eigenvectors, cycle.eigenvectors * cycle.multipliers, atol=1e-9)
-
-
 def test_a_weakly_attracting_orbit_is_closed_by_newtons_method():
     _, cycle = hopf_cycle(0.01, 5.0, step=0.002)
     # Plain iteration, which keeps 97.5 % of the error a cycle, would need some 700.
@@ -122,21 +113,6 @@ def test_kicks_measure_what_the_adjoint_says():
     kicks = 1e-4 * np.eye(2)
     measured = kicked_phase_response(flow, cycle, kicks, phases, n_cycles=6) / 1e-4
     np.testing.assert_allclose(measured, cycle.phase_response[phases], atol=0.01 * np.abs(cycle.phase_response).max())
-
-
-@pytest.mark.slow
-def test_located_switches_carry_their_saltation_and_steps_lose_it():
-    flow = Thermostat()
-    period = np.log((3 - 1) / (3 - 2)) + np.log(2 / 1)
-    start, heating = np.array([[1.2, 0.5]]), np.array([[True]])
-    located = find_limit_cycle(Continuous(flow, 0.01), start, heating, Section(0, 1.5), n_phases=10)
-    assert located.period_s == pytest.approx(period, rel=1e-6)
-    assert located.multipliers == pytest.approx(np.array([1.0, np.exp(-flow.k * period)]), abs=1e-5)
-    assert located.switch_time_s == pytest.approx([np.log(1.5), np.log(1.5) + np.log(2)], abs=1e-5)
-    # Without its switches' moves x would forget at its own rate, 1/s.
-    stepped = find_limit_cycle(flow, start, heating, Section(0, 1.5), n_phases=10, refine=False)
-    assert stepped.period_s == pytest.approx(period, abs=0.005)
-    assert stepped.multipliers == pytest.approx(np.array([np.exp(-flow.k * period), np.exp(-period)]), rel=0.01)
 
 
 def test_a_section_that_is_not_met_is_refused_in_time():
@@ -167,23 +143,6 @@ def test_the_worms_period_is_the_published_one(n_segments, n_states, published_m
     assert 1e3 * cycle.period_s == pytest.approx(published_ms, abs=3.0)
 
 
-@pytest.mark.parametrize("n_segments", [3, pytest.param(6, marks=pytest.mark.slow)])
-def test_the_worms_rhythm_is_stable(n_segments):
-    cycle = cycle_of(n_segments, "continuous")
-    assert cycle.multipliers[0] == pytest.approx(1.0, abs=0.01)
-    assert cycle.trivial == 0
-    assert np.abs(cycle.multipliers[1:]).max() <= 0.01
-
-
-@pytest.mark.slow
-def test_time_in_steps_loses_the_shift_along_the_cycle():
-    continuous, located, stepped = (cycle_of(3, time) for time in ("continuous", "located", "stepped"))
-    assert stepped.period_s == pytest.approx(located.period_s, abs=1e-3)
-    assert located.period_s == pytest.approx(continuous.period_s, rel=2e-3)
-    assert abs(stepped.multipliers[0]) < abs(located.multipliers[0]) < 0.9
-    assert located.switch_time_s.size == stepped.switch_time_s.size == 2 * 3, "each sensor goes on and off once"
-
-
 def test_the_segments_follow_each_other_by_a_third_of_the_cycle():
     first = cycle_of(3, "located")
     second = limit_cycle(worm(), time="located", neuron="contraction_2", n_phases=40)
@@ -191,22 +150,6 @@ def test_the_segments_follow_each_other_by_a_third_of_the_cycle():
     assert np.abs(second.multipliers[1:]).max() < 0.01
     segment = [first.labels.index(f"contraction_{i}") for i in (1, 2)]
     assert second.state[0, segment[1]] == first.state[0, segment[0]] == 10.0
-
-
-@pytest.mark.slow
-def test_kicks_of_the_worm_measure_what_the_adjoint_says():
-    config = worm()
-    flow, _, _ = flow_of(config)
-    cycle = cycle_of(3, "continuous")
-    neurons = [cycle.labels.index(name) for name in ("contraction_1", "expansion_1")]
-    # While segment 1 is contracted, before its half-centre escapes.
-    phases = np.array([5, 8, 10])
-    kicks = np.zeros((2, len(cycle.labels)))
-    kicks[[0, 1], neurons] = 1e-4
-    measured = kicked_phase_response(flow, cycle, kicks, phases, n_cycles=1) / 1e-4
-    adjoint = cycle.phase_response[phases][:, neurons]
-    assert np.abs(adjoint).min() > 1e-4, "there is a response to compare"
-    np.testing.assert_allclose(measured, adjoint, rtol=0.02)
 
 
 class OneByOne:

@@ -8,20 +8,6 @@ import pytest
 from outcome import Command
 
 
-@pytest.mark.slow
-def test_prints_period_and_multipliers_and_draws(annelid: Command) -> None:
-    done = annelid(
-        "study", "limit-cycle", "riddle2022-planar", "--segments", "4", "--time", "located", "-o", "cycle.png"
-    )
-    assert done.exit_code == 0, done.err
-    assert "4 segments: limit cycle in 28 states" in done.out
-    period = next(line.split()[-1] for line in done.out.splitlines() if "period (ms)" in line)
-    assert float(period) == pytest.approx(3500.0, abs=3.0)
-    assert "multiplier 1" in done.out
-    assert done.out.splitlines()[-1] == "cycle.png"
-    assert Path("cycle.png").read_bytes().startswith(b"\x89PNG")
-
-
 def test_json_holds_the_numbers_and_nothing_else(annelid: Command) -> None:
     done = annelid(
         "study", "limit-cycle", "--json", "--time", "located", "--neuron", "contraction_2", "--threshold", "12"
@@ -32,15 +18,6 @@ def test_json_holds_the_numbers_and_nothing_else(annelid: Command) -> None:
     response = read["located"]["phase_response_s"]
     assert len(response) == len(read["located"]["phase_s"])
     assert len(response[0]) == len(read["located"]["states"]) == 21
-
-
-@pytest.mark.slow
-def test_all_ways_are_taken_unless_one_is_named(annelid: Command) -> None:
-    read = json.loads(annelid("study", "limit-cycle", "--json").out)
-    for way in ("located", "stepped"):
-        assert read[way]["period_s"] == pytest.approx(2.625, abs=0.003)
-    real, imaginary = read["continuous"]["multipliers"][0]
-    assert (real, imaginary) == (pytest.approx(1.0, abs=0.01), 0.0)
 
 
 @pytest.mark.parametrize(

@@ -53,15 +53,15 @@ def test_another_readers_outcome_is_refused(held: Run, tmp_path: Path, monkeypat
         read_outcome(tmp_path / "outcome.json")
 
 
-@pytest.mark.parametrize("loss", ["summary", "rhythm", "holds", "message", "gait"])
-def test_an_incomplete_outcome_is_refused(held: Run, tmp_path: Path, loss: str) -> None:
+def test_an_incomplete_outcome_is_refused(held: Run, tmp_path: Path) -> None:
     path = tmp_path / "outcome.json"
-    write_outcome(outcome(held), path)
-    content = json.loads(path.read_text())
-    del content[loss]
-    path.write_text(json.dumps(content))
-    with pytest.raises(ValueError, match="no outcome"):
-        read_outcome(path)
+    for loss in ("summary", "rhythm", "holds", "message", "gait"):
+        write_outcome(outcome(held), path)
+        content = json.loads(path.read_text())
+        del content[loss]
+        path.write_text(json.dumps(content))
+        with pytest.raises(ValueError, match="no outcome"):
+            read_outcome(path)
 
 
 def test_no_outcome_is_an_os_error(tmp_path: Path) -> None:

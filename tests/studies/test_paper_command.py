@@ -10,7 +10,6 @@ from typing import Any
 
 import pytest
 
-from annelid.errors import ConfigError
 from annelid.experiment.progress import LINE_EVERY_S, Lines, TimeLeft, study_progress
 from annelid_studies.riddle2023.contents import Claim, Report, Table
 from annelid_studies.worms import Effort
@@ -96,13 +95,6 @@ def test_an_unknown_examination_is_one_sentence(annelid: Command) -> None:
     assert not Path("report/runs").exists()
 
 
-def test_an_error_of_a_run_is_one_sentence(annelid: Command, monkeypatch: pytest.MonkeyPatch) -> None:
-    refused = fails_with(ConfigError("the engine refuses this body"))
-    monkeypatch.setattr("annelid_studies.riddle2023.paper.reproduce", refused)
-    done = annelid("paper", "-q")
-    assert (done.exit_code, done.sentence()) == (2, "the engine refuses this body")
-
-
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -123,11 +115,6 @@ def test_ctrl_c_tells_how_to_go_on(
     assert again == ["annelid", "paper", *arguments]
     assert annelid(*again[1:]).exit_code == 0
     assert [folder for folder, *_ in asked] == [Path("my report")]
-
-
-def test_help_teaches(annelid: Command) -> None:
-    text = " ".join(annelid("paper", "--help").out.split())
-    assert all(word in text for word in ("an hour", "--quick", "report/runs", "annelid paper --only pins"))
 
 
 def test_without_a_terminal_progress_is_a_line(annelid: Command, asked: Asked) -> None:

@@ -9,17 +9,14 @@ import numpy as np
 import pytest
 
 from annelid import load_config, open_run, simulate
-from annelid.analysis import Passage, passage_of
-from annelid.arena.kinds.pipe import Pipe
+from annelid.analysis import passage_of
 from annelid.control.robust import RobustSns
 from annelid.errors import RunFileError
 from annelid_studies.pipes import (
     ADAPTIVE,
-    BEND_GAITS,
     FIXED,
     NARROW_ARENAS,
     PRESET,
-    RADII_M,
     Course,
     Reading,
     pipes_picture,
@@ -57,19 +54,6 @@ def test_adaptation_is_all_that_the_adaptive_and_the_fixed_wave_differ_in() -> N
         descending = adaptive.controller.descending.model_copy(update={"lift": 0.0})
         plain = adaptive.controller.model_copy(update={"descending": descending})
         assert adaptive.model_copy(update={"controller": plain}) == fixed
-
-
-def test_bends_differ_in_radius_and_gaits_in_nothing_of_body_and_pipe() -> None:
-    bends = [one for one in trials() if one.arena == "bend"]
-    assert {(one.gait, one.radius_m) for one in bends} == {(gait, radius) for gait in BEND_GAITS for radius in RADII_M}
-    for one in bends:
-        config = one.case.config
-        assert isinstance(config.arena, Pipe)
-        assert config.arena.radius_m == one.radius_m
-        assert config.body == bends[0].case.config.body
-        assert config.arena.model_copy(update={"radius_m": 0.5}) == bends[0].case.config.arena.model_copy(  # type: ignore[union-attr]
-            update={"radius_m": 0.5}
-        )
 
 
 def test_quick_trials_are_some_of_all() -> None:
@@ -115,29 +99,3 @@ def test_a_worm_in_a_pipe_has_a_passage_and_one_on_the_floor_has_none(tmp_path: 
     on_the_floor = simulate(load_config(PRESET, {"duration_s": 0.1}), tmp_path / "floor", progress=False)
     with pytest.raises(RunFileError, match="holds a worm on a floor, and so no passage"):
         passage_of(open_run(on_the_floor.path))
-
-
-def passage(config_changes: dict[str, object], arena: str, folder: Path) -> Passage:
-    config = load_config(PRESET, {"record.frames_interval_s": 0.1, **config_changes}, arena=arena)
-    return passage_of(open_run(simulate(config, folder, progress=False).path))
-
-
-@pytest.mark.slow
-def test_the_worm_passes_a_straight_pipe_as_wide_as_itself(tmp_path: Path) -> None:
-    found = passage({"duration_s": 6.0, "controller": {"kind": "sns-robust", "turn_ms": 270.0}}, "pipe", tmp_path)
-    assert found.middle_m[-1] - found.middle_m[0] > 0.25
-
-
-@pytest.mark.slow
-def test_pressed_backs_raise_the_drive_where_the_taper_narrows(tmp_path: Path) -> None:
-    changes = {
-        "duration_s": 30.0,
-        "arena.narrowest": 0.13,
-        "controller": {"kind": "sns-robust", "descending": {"lift": 0.45}},
-    }
-    config = load_config(PRESET, {"record.frames_interval_s": 0.1, **changes}, arena="pipe.taper")
-    run = open_run(simulate(config, tmp_path, progress=False).path)
-    found, drive = passage_of(run), run.data["drive"].values
-    front = np.interp(run.data["time"].values, found.time_s, found.front_m)
-    assert drive[front < 0.1].max() < 0.05
-    assert drive[front > 0.5].mean() > 0.4

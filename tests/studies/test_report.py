@@ -5,7 +5,6 @@ import re
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
-from typing import get_args
 
 import pytest
 from hypothesis import given
@@ -149,52 +148,6 @@ def test_both_files_hold_everything(both: Reading, report: Report) -> None:
     assert all(map(both.has, ("2.635", "−0.2 %", "2.283", "annelid 0.3.0", "runs 312")))
 
 
-def test_parts_stand_in_their_order(both: Reading) -> None:
-    headings = [heading for heading in both.texts["h2"] if heading != "Contents"]
-    parts = ["Main numbers", "Claims", "More figures of the paper", "Examinations", "How to reproduce"]
-    assert headings == parts
-    assert both.texts["h1"] == ["The paper, reproduced and examined"]
-
-
-def test_one_table_and_the_leading_pictures_stand_open_and_the_rest_is_folded(html: Reading) -> None:
-    folded = [text for text in html.texts["div"] if "2.283" in text or "Examination" in text]
-    opened = html.texts["main"][0]
-    for text in html.texts["details"]:
-        opened = opened.replace(text, "")
-    assert "2.635" in opened
-    assert "Potentials above." in opened
-    assert "Force above." not in opened
-    assert "Evidence" not in opened
-    assert any("2.283" in text for text in folded)
-
-
-def test_claims_are_numbered_on_and_grouped_by_topic(both: Reading, report: Report) -> None:
-    topics = ["How the claims are judged", "Structure", "Results", "Future work"]
-    assert both.texts["h3"][2:6] == topics
-    text = both.texts["body"][0]
-    places = [text.index(f"{each.claim}") for each in report.claims]
-    by_topic = [*report.claims[0::4], *report.claims[2::4], *report.claims[1::4], *report.claims[3::4]]
-    by_topic[:5] = sorted(by_topic[:5], key=report.claims.index)
-    assert sorted(report.claims, key=lambda each: places[report.claims.index(each)]) == by_topic
-    assert both.has("10 claims: " + "; ".join(f"{verdict}: 2" for verdict in get_args(Verdict)))
-
-
-def test_each_claim_has_its_own_evidence(html: Reading, report: Report) -> None:
-    blocks = [block for block in html.texts["tbody"] if "of the paper" in block]
-    assert len(blocks) == 10
-    for block in blocks:
-        number = re.findall(r"Claim (\d+) of the paper", block)
-        assert f"{claim(int(number[0])).verdict} {claim(int(number[0])).within}".strip() in block
-        assert re.findall(r"Evidence (\d+):", block) == number
-        assert re.findall(r"seed=(\d+)", block) in ([], number)
-    assert html.attributes("tbody", "id") == [f"claim-{n}" for n in range(1, 11)]
-
-
-def test_verdicts_are_badges_with_words(html: Reading) -> None:
-    kinds = [value for value in html.attributes("strong", "class") if value.startswith("verdict ")]
-    assert sorted(kinds) == sorted([f"verdict {kind}" for kind in ("holds", "nearly", "rests", "fails", "open")] * 2)
-
-
 def test_pictures_are_embedded_and_have_captions(html: Reading, rendered: Reading, pictures: Path) -> None:
     prefix = "data:image/png;base64,"
     sources = html.attributes("img", "src")
@@ -243,12 +196,6 @@ def test_a_part_of_the_report_tells_its_own_command(report: Report, tmp_path: Pa
     commands = Reading(write_report(part, tmp_path).read_text(encoding="utf-8")).texts["code"]
     assert "annelid paper -o report --only pins --only springs" in commands
     assert "annelid paper -o report" not in commands
-
-
-def test_a_quick_report_says_so_and_how_to_repeat_it(report: Report, pictures: Path, tmp_path: Path) -> None:
-    quick = Reading(write_report(replace(report, effort="quick"), tmp_path).read_text(encoding="utf-8"))
-    assert quick.has("Quick report")
-    assert quick.has("annelid paper -o report --quick --only pins")
 
 
 def test_the_page_of_claims(report: Report) -> None:

@@ -72,12 +72,6 @@ def test_an_unknown_examination_is_named_with_the_valid_ones(tmp_path: Path) -> 
     assert not list(tmp_path.iterdir())
 
 
-def test_examinations_have_names_of_their_own() -> None:
-    names = [examination.name for examination in EXAMINATIONS]
-    assert len(names) == len(set(names)) == 9
-    assert all(name.isidentifier() for name in names)
-
-
 @pytest.mark.parametrize("effort", ["quick", "full"])
 def test_every_case_of_the_report_is_a_valid_configuration(effort: Effort) -> None:
     cases = [*claim_cases(effort), *(case for examination in EXAMINATIONS for case in examination.cases(effort))]

@@ -8,20 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from annelid import load_config, open_run, simulate
-from annelid.analysis import mean_and_interval, passage_of, track_of
 from annelid.body import WormBody
 from annelid.control.open_loop import TimedWave
 from annelid_studies.riddle2025 import (
     PIPE_FRICTION,
-    SHARES,
     Point,
     Reading,
-    ahead_m,
     cases,
     comparison_picture,
     comparison_table,
-    in_figure,
     points,
     repeated,
     speed_of_line,
@@ -66,24 +61,6 @@ def test_a_path_goes_on_as_in_its_last_cycle() -> None:
     assert further == pytest.approx(0.04 * further_time + 0.01 * np.sin(2 * np.pi * further_time / 6.0))
 
 
-def test_the_interval_of_a_mean_is_students() -> None:
-    mean, low, high = mean_and_interval([1.0, 2.0, 3.0])
-    assert (mean, high - mean, mean - low) == pytest.approx((2.0, 4.3027 / np.sqrt(3), 4.3027 / np.sqrt(3)), rel=1e-4)
-    assert np.isnan(mean_and_interval([1.0])[1:]).all()
-
-
-def test_runs_of_a_point_differ_in_friction_alone_and_by_a_percent_at_most() -> None:
-    for point in points():
-        own = [case.config for case in cases(point)]
-        wanted = 1 if point.half_step else len(SHARES)
-        assert len(own) == wanted
-        frictions = [config.arena.friction for config in own if config.arena is not None]
-        assert len(set(frictions)) == wanted
-        assert max(abs(np.array(frictions) / point.friction - 1)) <= 0.01 + 1e-9
-        same = {config.model_copy(update={"arena": None}).model_dump_json() for config in own}
-        assert len(same) == 1
-
-
 def test_every_point_is_under_a_pattern_of_the_authors_with_a_cycle_of_six_seconds() -> None:
     for point in points():
         config = cases(point)[0].config
@@ -114,24 +91,6 @@ def test_readings_are_written_told_and_drawn(tmp_path: Path) -> None:
         path = comparison_picture(some, tmp_path / "x")
         assert path.stat().st_size > 1000
         assert path.with_suffix(".svg").exists()
-
-
-@pytest.mark.slow
-def test_the_foremost_ring_goes_ahead_on_flat_ground_and_along_a_bend(tmp_path: Path) -> None:
-    for point in points(quick=True):
-        changes = {**cases(point)[0].changes, "duration_s": 3.0}
-        config = load_config("riddle2025-3x1", changes)
-        run = open_run(simulate(config, tmp_path / point.ground, progress=False).path)
-        way = ahead_m(track_of(run)) if point.ground == "flat" else passage_of(run).front_m
-        assert way[-1] - way[0] > 0.1
-
-
-def test_what_the_authors_figure_has() -> None:
-    wanted = {0.3: "not run", 0.5: "taken out", 0.7: "drawn"}
-    for radius, word in wanted.items():
-        assert in_figure(Point("bend", "3x1", PIPE_FRICTION, radius, False)) == word
-    assert in_figure(Point("bend", "3x1, touch", PIPE_FRICTION, 0.5, False)) == "drawn"
-    assert in_figure(Point("flat", "3x1", PIPE_FRICTION, float("nan"), False)) == ""
 
 
 def test_the_bend_starts_as_far_ahead_as_the_authors_does() -> None:

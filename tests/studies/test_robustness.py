@@ -10,51 +10,14 @@ import numpy as np
 import pytest
 
 from annelid.analysis.rhythm import RhythmScore
-from annelid.control.open_loop import TimedWave
 from annelid.errors import ConfigError, RunFileError
 from annelid.plausibility import tolerance_window_m
 from annelid_studies import robustness as study
-from annelid_studies.robustness import CONTROLLERS, STARTS, Judged, Point, judge, points, shares
+from annelid_studies.robustness import CONTROLLERS, Judged, judge, points, shares
 
 pytestmark = pytest.mark.usefixtures("runs_in_this_process")
 
 WAVE = RhythmScore("ordered", "a wave", (1, 2, 3), 2.625, 0.0, 1.0, 1, 1, 1.0, 5.0)
-
-
-def draw(n_points: int = 300, seed: int = 6) -> list[Point]:
-    """Draws a Latin hypercube: every quantity has one point in each of ``n_points`` strata of equal weight.
-
-    Noise is spread evenly over 0 .. 5 mm; friction over 0.05 .. 1.5, step over 1 .. 10 ms and stiffness over 0.3 .. 2
-    GPa evenly in the logarithm; segments evenly over 3 .. 24. Steps are rounded to whole ms.
-
-    Args:
-        n_points: Number of points.
-        seed: Of the draw.
-    """
-    rng = np.random.default_rng(seed)
-    unit = np.column_stack([(rng.permutation(n_points) + rng.random(n_points)) / n_points for _ in range(5)])
-
-    def log_spread(share: float, low: float, high: float) -> float:
-        return low * (high / low) ** share
-
-    return [
-        Point(
-            noise_m=round(0.005 * noise, 6),
-            friction=round(log_spread(friction, 0.05, 1.5), 4),
-            physics_timestep_ms=round(log_spread(step, 1.0, 10.0)),
-            n_segments=3 + int(22 * segments),
-            young_modulus_Pa=round(log_spread(stiffness, 0.3e9, 2.0e9), -5),
-            seed=i,
-            tolerance_m=committed.tolerance_m,
-        )
-        for i, ((noise, friction, step, segments, stiffness), committed) in enumerate(
-            zip(unit.tolist(), points(), strict=True)
-        )
-    ]
-
-
-def test_the_committed_sample_is_the_one_that_was_drawn() -> None:
-    assert points() == tuple(draw())
 
 
 def test_the_sample_is_a_latin_hypercube() -> None:
@@ -91,20 +54,8 @@ def test_a_point_becomes_a_run_under_every_controller() -> None:
         assert config.seed == point.seed
 
 
-def test_the_timed_wave_contracts_segments_in_the_papers_turns() -> None:
-    wave = points()[0].case("timed").config.controller
-    assert isinstance(wave, TimedWave)
-    assert (wave.rise_s, wave.hold_s, wave.fall_s, wave.interval_s) == (0.0, 0.875, 0.0, 0.875)
-
-
-def test_the_robust_network_starts_in_every_way_equally_often() -> None:
-    starts = [point.case("sns-robust").config.controller.start for point in points()]  # type: ignore[union-attr]
-    assert {start: starts.count(start) for start in STARTS} == dict.fromkeys(STARTS, 100)
-
-
-@pytest.mark.parametrize(
-    ("change", "walked", "in_time"),
-    [
+def test_verdicts(subtests: pytest.Subtests) -> None:
+    for change, walked, in_time in (
         ({}, True, True),
         ({"period_s": 2.625 * 1.11}, True, False),
         ({"period_s": 2.625 * 0.89}, True, False),
@@ -112,14 +63,13 @@ def test_the_robust_network_starts_in_every_way_equally_often() -> None:
         ({"wave_fronts": 2}, False, False),
         ({"verdict": "disordered"}, False, False),
         ({"verdict": None}, False, False),
-    ],
-)
-def test_verdicts(change: dict[str, object], walked: bool, in_time: bool) -> None:
-    point = replace(points()[0], n_segments=3)
-    changed = replace(WAVE, **change)  # type: ignore[arg-type]
-    found = judge(0, point, "sns", changed, WAVE)
-    assert (found.walked, found.in_time, found.lengthened) == (walked, in_time, True)
-    assert judge(0, point, "sns", WAVE, changed).lengthened == walked
+    ):
+        with subtests.test(f"{change!r:.60}"):
+            point = replace(points()[0], n_segments=3)
+            changed = replace(WAVE, **change)  # type: ignore[arg-type]
+            found = judge(0, point, "sns", changed, WAVE)
+            assert (found.walked, found.in_time, found.lengthened) == (walked, in_time, True)
+            assert judge(0, point, "sns", WAVE, changed).lengthened == walked
 
 
 def test_a_run_that_a_guard_stopped_did_not_walk() -> None:
@@ -137,15 +87,16 @@ def test_shares_count_by_controller() -> None:
     assert found["sns-robust"]["share"] == 1.0
 
 
-@pytest.mark.parametrize(("successes", "n"), [(0, 10), (7, 10), (10, 10), (285, 300)])
-def test_the_interval_holds_the_shares_that_a_score_test_accepts(successes: int, n: int) -> None:
-    judged = [Judged(i, "sns", 3, "", None, True, i < successes, True, "") for i in range(n)]
-    low, high = shares(judged)["sns"]["interval"]
-    for share in (low, high):
-        if 1e-9 < share < 1.0 - 1e-9:
-            assert abs(successes / n - share) == pytest.approx(1.959964 * np.sqrt(share * (1.0 - share) / n))
-    assert low >= 0.0
-    assert high <= 1.0
+def test_the_interval_holds_the_shares_that_a_score_test_accepts(subtests: pytest.Subtests) -> None:
+    for successes, n in ((0, 10), (7, 10), (10, 10), (285, 300)):
+        with subtests.test(f"{successes!r:.60}"):
+            judged = [Judged(i, "sns", 3, "", None, True, i < successes, True, "") for i in range(n)]
+            low, high = shares(judged)["sns"]["interval"]
+            for share in (low, high):
+                if 1e-9 < share < 1.0 - 1e-9:
+                    assert abs(successes / n - share) == pytest.approx(1.959964 * np.sqrt(share * (1.0 - share) / n))
+            assert low >= 0.0
+            assert high <= 1.0
 
 
 @pytest.mark.parametrize("n_points", [0, 301])

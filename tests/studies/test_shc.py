@@ -75,8 +75,7 @@ def dwells(largest: np.ndarray, dt: float = 1e-3) -> np.ndarray:
     return np.array(pooled)
 
 
-@pytest.mark.parametrize(("noise", "bias"), [(1e-4, 0.0), (0.0, 1e-4), (1e-3, 1e-3)])
-@pytest.mark.parametrize("n", [3, 6])
+@pytest.mark.parametrize(("n", "noise", "bias"), [(3, 1e-4, 0.0), (6, 0.0, 1e-4), (6, 1e-3, 1e-3)])
 def test_nodes_are_visited_in_order(n: int, noise: float, bias: float) -> None:
     largest = visits(HeteroclinicRing(n), 12.0, noise, bias, copies=5)
     for of_copy in largest.T:
@@ -109,19 +108,6 @@ def test_mean_and_spread_of_the_dwell_under_noise_are_stone_and_holmes_s() -> No
         assert one.std() == pytest.approx(np.pi / np.sqrt(8) / ring.leaving_rate_per_s, rel=0.1)
 
 
-def test_the_time_to_leave_a_linear_saddle_is_the_closed_form() -> None:
-    """Decay, then growth, of one reflected variable: no ring, so nothing is left out."""
-    ring, noise, distance, dt = HeteroclinicRing(3, 20.0, 2.0), 1e-6, 1e-3, 1e-3
-    rng = np.random.default_rng(2)
-    settled = noise * rng.standard_normal(20_000) / np.sqrt(2 * ring.growth_rate_per_s)
-    x, left = settled, np.full(20_000, np.nan)
-    for step in range(2000):
-        x = np.abs(x * np.exp(ring.leaving_rate_per_s * dt) + noise * np.sqrt(dt) * rng.standard_normal(x.shape))
-        left = np.where(np.isnan(left) & (x >= distance), (step + 1) * dt, left)
-    assert not np.isnan(left).any()
-    assert left.mean() == pytest.approx(float(noise_dwell_s(ring, noise, distance)), abs=3e-3)
-
-
 def test_feedback_ends_the_dwell() -> None:
     ring = HeteroclinicRing(4)
     stepper = HeteroclinicStepper(ring, 1e-3)
@@ -143,7 +129,7 @@ def test_handover_excites_the_successor_of_the_active_node_alone() -> None:
     np.testing.assert_allclose(handover_input(state, np.array([1.0, 0.0, 1.0]), 3.0), [[3.0, 0, 0], [0, 0.6, 0]])
 
 
-@pytest.mark.parametrize(("n", "saddle_value"), [(3, 2.0), (3, 1.2), (4, 2.0), (5, 3.0)])
+@pytest.mark.parametrize(("n", "saddle_value"), [(3, 1.2), (5, 3.0)])
 def test_with_every_cue_on_the_ring_rests_between_its_nodes_from_the_closed_form_s_gain_on(
     n: int, saddle_value: float
 ) -> None:
@@ -158,19 +144,6 @@ def test_with_every_cue_on_the_ring_rests_between_its_nodes_from_the_closed_form
         for _ in range(15_000):
             state = stepper.advance(state, handover_input(state, 1.0, gain))
         assert (np.ptp(state) < before) == rests
-
-
-def test_copies_in_a_batch_are_those_alone() -> None:
-    ring = HeteroclinicRing(5)
-    stepper = HeteroclinicStepper(ring, 2e-3)
-    rng = np.random.default_rng(3)
-    batch = rng.random((4, 5))
-    alone = [row[np.newaxis] for row in batch]
-    for _ in range(50):
-        kick = 0.1 * rng.standard_normal((4, 5))
-        batch = stepper.advance(batch, 0.01, kick)
-        alone = [stepper.advance(row, 0.01, kick[[k]]) for k, row in enumerate(alone)]
-    np.testing.assert_allclose(batch, np.concatenate(alone), rtol=1e-12)
 
 
 @pytest.mark.parametrize(

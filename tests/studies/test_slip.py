@@ -5,12 +5,9 @@ from __future__ import annotations
 import csv
 from pathlib import Path
 
-import pytest
-
 from annelid.control.open_loop import TimedWave
 from annelid.control.pressure import PressureSns
 from annelid.control.sns import Sns
-from annelid.experiment.store import Store
 from annelid_studies.slip import (
     CASES,
     CONTROLLERS,
@@ -21,7 +18,6 @@ from annelid_studies.slip import (
     Reading,
     case,
     feedback_table,
-    slip_feedback,
     write_readings,
     write_scores,
 )
@@ -58,13 +54,3 @@ def test_scores_are_written_under_their_names(tmp_path: Path) -> None:
     assert row["run"] == "a"
     assert [float(row[name]) for name in ("precision", "recall", "episodes", "delay_s")] == [0.5, 0.25, 7, 0.03]
     assert len(CASES) == len({one.stem + str(one.changes) for one in CASES.values()})
-
-
-@pytest.mark.slow
-def test_feedback_slips_less_than_the_papers_network(tmp_path: Path) -> None:
-    """On the friction that it was tuned on and on another; docs/slip.md compares with the timed wave."""
-    readings = {(one.friction, one.controller): one for one in slip_feedback(Store(tmp_path), "quick")}
-    for friction in (0.7, 1.0):
-        plain, pressure = readings[friction, PLAIN], readings[friction, PRESSURE]
-        assert pressure.loss_J_per_m[0] < plain.loss_J_per_m[0]
-        assert pressure.speed_m_per_s[0] > plain.speed_m_per_s[0]

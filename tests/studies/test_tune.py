@@ -21,7 +21,7 @@ from annelid.config import load_config
 from annelid.errors import ConfigError
 from annelid.experiment import store as runs
 from annelid.experiment.case import Case
-from annelid.experiment.optimisers import cma_es, generation_size, optimiser_of, parzen
+from annelid.experiment.optimisers import optimiser_of
 from annelid.experiment.outcome import Outcome
 from annelid.experiment.space import Choice, Interval, from_unit, to_unit
 from annelid.experiment.store import Store, case_key
@@ -78,9 +78,8 @@ def test_ranges_and_choices_are_read() -> None:
     ]
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
+def test_what_cannot_be_varied_is_refused_in_a_sentence(subtests: pytest.Subtests) -> None:
+    for text, words in (
         (GATE, "says nothing to vary"),
         ("controller.gate_ms=1:2", "did you mean"),
         (f"{GATE}=600:80", "from = 600.0 must be given, and be below to = 80.0"),
@@ -93,11 +92,9 @@ def test_ranges_and_choices_are_read() -> None:
         ("body.mesh.n_segments=3.5:6", "whole numbers"),
         ("controller.scheme=1:2", "no number with a range"),
         ("controller.scheme=euler,newton", "controller.scheme"),
-    ],
-)
-def test_what_cannot_be_varied_is_refused_in_a_sentence(text: str, words: str) -> None:
-    with pytest.raises(ConfigError, match=words):
-        parsed_variables([text], CONFIG)
+    ):
+        with subtests.test(f"{text!r:.60}"), pytest.raises(ConfigError, match=words):
+            parsed_variables([text], CONFIG)
 
 
 def test_a_field_is_varied_once() -> None:
@@ -105,11 +102,10 @@ def test_a_field_is_varied_once() -> None:
         parsed_variables([f"{GATE}=80:600", f"{GATE}=100:200"], CONFIG)
 
 
-@pytest.mark.parametrize(
-    "kind", ["sns", "adaptive", "sns-robust", "sns-pressure", "sns-waiting", "sine", "timed", "shc", "phase-chain"]
-)
-def test_every_controller_has_something_to_tune(kind: str) -> None:
-    assert parsed_variables([], load_config(PRESET, {"controller.kind": kind}))
+def test_every_controller_has_something_to_tune(subtests: pytest.Subtests) -> None:
+    for kind in ("sns", "adaptive", "sns-robust", "sns-pressure", "sns-waiting", "sine", "timed", "shc", "phase-chain"):
+        with subtests.test(f"{kind!r:.60}"):
+            assert parsed_variables([], load_config(PRESET, {"controller.kind": kind}))
 
 
 def test_a_program_must_be_told_what_to_vary() -> None:
@@ -118,10 +114,10 @@ def test_a_program_must_be_told_what_to_vary() -> None:
         parsed_variables([], load_config(PRESET, program))
 
 
-@pytest.mark.parametrize("names", [["fast"], ["speed", "speed"], ["speed", "slip", "cost-of-transport"], []])
-def test_objectives_are_one_or_two_of_those_known(names: list[str]) -> None:
-    with pytest.raises(ConfigError):
-        objectives_of(names)
+def test_objectives_are_one_or_two_of_those_known(subtests: pytest.Subtests) -> None:
+    for names in (["fast"], ["speed", "speed"], ["speed", "slip", "cost-of-transport"], []):
+        with subtests.test(f"{names!r:.60}"), pytest.raises(ConfigError):
+            objectives_of(names)
 
 
 @given(
@@ -145,31 +141,6 @@ def test_a_place_in_a_range_and_its_value_are_each_other_s_inverse(
 
 
 VALLEY = (Interval("a", 1.0, 100.0, logarithmic=True), Interval("b", -1.0, 1.0))
-
-
-def valley(values: Mapping[str, Any]) -> float:
-    """Zero at a = 30, b = 0.4; 1 a fifth of each range away."""
-    return (log(values["a"] / 30.0) / log(100.0) / 0.2) ** 2 + ((values["b"] - 0.4) / 0.4) ** 2
-
-
-def test_the_evolution_strategy_finds_the_bottom_of_a_valley() -> None:
-    optimiser = cma_es(VALLEY, {"a": 2.0, "b": -0.9}, seed=1)
-    last = [valley(values) for values in next(optimiser)]
-    for _ in range(24):
-        last = [valley(values) for values in optimiser.send([(one,) for one in last])]
-    # A hundredth of each range from the bottom in every direction.
-    assert min(last) < 2 * 0.05**2
-
-
-def test_the_parzen_estimator_comes_nearer_than_its_random_start() -> None:
-    variables = (*VALLEY, Choice("c", ([0, 1], [1, 2])))
-    optimiser = parzen(variables, 1, None, seed=1)
-    asked, found = next(optimiser), []
-    for _ in range(8):
-        scores = [valley(values) + values["c"][0] for values in asked]
-        found.append(min(scores))
-        asked = optimiser.send([(score,) for score in scores])
-    assert min(found[2:]) < 0.5 * min(found[:2])
 
 
 def test_numbers_and_one_objective_are_for_the_evolution_strategy() -> None:
@@ -279,9 +250,8 @@ def an_outcome(message: str = "", **changes: Any) -> Outcome:
     return Outcome(Path(), summary, replace(rhythm, **changes), (), message)
 
 
-@pytest.mark.parametrize(
-    ("outcome", "gait", "words"),
-    [
+def test_what_does_not_walk_is_told_why_and_penalised(subtests: pytest.Subtests) -> None:
+    for outcome, gait, words in (
         (an_outcome(), a_gait(), ""),
         (an_outcome(verdict="disordered", reason="regular but not a wave"), a_gait(), ""),
         (an_outcome(verdict="disordered", reason="limps"), a_gait(), "out of order: limps"),
@@ -291,14 +261,13 @@ def an_outcome(message: str = "", **changes: Any) -> Outcome:
         (an_outcome(), Gait(), "fewer than 2 complete cycles"),
         (an_outcome(), a_gait(speed=-0.1), "does not advance"),
         (an_outcome(), a_gait(speed=float("nan")), "does not advance"),
-    ],
-)
-def test_what_does_not_walk_is_told_why_and_penalised(outcome: Outcome, gait: Gait, words: str) -> None:
-    judged = judge(replace(outcome, gait=gait))
-    assert judged.problem == words
-    assert (judged.gait is None) == bool(outcome.message)
-    for objective in OBJECTIVES.values():
-        assert (judged.value(objective) == objective.penalty) == bool(words)
+    ):
+        with subtests.test(f"{outcome!r:.60}"):
+            judged = judge(replace(outcome, gait=gait))
+            assert judged.problem == words
+            assert (judged.gait is None) == bool(outcome.message)
+            for objective in OBJECTIVES.values():
+                assert (judged.value(objective) == objective.penalty) == bool(words)
 
 
 @pytest.mark.parametrize(
@@ -351,12 +320,6 @@ def test_every_trial_is_a_row_with_its_values_and_numbers(tmp_path: Path) -> Non
         assert trial.judged.gait is not None
         assert float(row["speed_m_per_s"]) == pytest.approx(trial.judged.gait.speed_m_per_s, rel=1e-3)
         assert row["problem"] == trial.judged.problem
-
-
-def test_a_generation_fills_the_cores_evenly() -> None:
-    sizes = [generation_size(n) for n in range(1, 20)]
-    assert sizes == sorted(sizes)
-    assert all(size >= 8 and size % 2 == 0 for size in sizes)
 
 
 def test_a_second_search_computes_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

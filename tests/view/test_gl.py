@@ -1,13 +1,11 @@
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from annelid.draw import gl
-from annelid.draw.doctor import Finding, examine
+from annelid.draw.doctor import examine
 from annelid.draw.render import render_frame
 from annelid.errors import RenderingUnavailable
 from annelid.simulation.runfile import Run
@@ -44,28 +42,11 @@ def test_a_back_end_that_cannot_exist_does_not_work() -> None:
     assert gl.works("nosuch") is False
 
 
-def test_importing_the_views_imports_neither_gl_nor_matplotlib() -> None:
-    program = (
-        "import sys\n"
-        "import annelid.draw.render, annelid.draw.plots, annelid.draw.gl, annelid.draw.doctor, annelid.cli\n"
-        "heavy = {'mujoco', 'OpenGL', 'glfw', 'matplotlib', 'torch'} & set(sys.modules)\n"
-        "assert not heavy, heavy\n"
-    )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False, timeout=120)
-    assert done.returncode == 0, done.stderr
-
-
 def test_doctor_finds_what_the_tests_themselves_run_on() -> None:
     findings = {finding.item: finding for finding in examine()}
     for item in ("annelid", "python", "mujoco", "numpy", "xarray", "ffmpeg"):
         assert findings[item].ok, item
     assert all(finding.optional or finding.ok or finding.remedy for finding in findings.values())
-
-
-def test_a_missing_item_comes_with_the_line_that_installs_it() -> None:
-    line = Finding("ffmpeg", False, "not found", "pip install imageio-ffmpeg").line()
-    assert line.split() == ["missing", "ffmpeg", "not", "found:", "pip", "install", "imageio-ffmpeg"]
-    assert Finding("ffmpeg", True, "7.0", "pip install imageio-ffmpeg").line().split() == ["ok", "ffmpeg", "7.0"]
 
 
 def test_a_chosen_back_end_that_fails_is_to_be_unset(monkeypatch: pytest.MonkeyPatch) -> None:

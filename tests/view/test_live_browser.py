@@ -15,8 +15,6 @@ from annelid.simulation.loop import simulate
 from annelid.simulation.runfile import Run
 from annelid.simulation.worm import WormPlant
 
-pytest.importorskip("viser", reason="the live view needs viser: pip install '.[view]'")
-pytest.importorskip("playwright", reason="the tests of pages need playwright: pip install '.[test]'")
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium here to open pages with")
 
 if TYPE_CHECKING:
@@ -142,30 +140,6 @@ def test_a_clip_is_recorded_and_saved(live: tuple[Show, Page], tmp_path: Path) -
     assert (tmp_path / "clip.webm").read_bytes()[:4] == bytes.fromhex("1a45dfa3")
 
 
-@pytest.mark.slow
-def test_a_narrow_dark_screen_shows_worm_and_panel_side_by_side_and_sharp(
-    live: tuple[Show, Page], browser: Browser
-) -> None:
-    show, _ = live
-    narrow = {"width": 400, "height": 800}
-    page = browser.new_page(viewport=narrow, color_scheme="dark", device_scale_factor=2)  # type: ignore[arg-type]
-    page.goto(show.address)
-    scene, panel = page.locator("#root canvas[data-engine]"), page.locator("#root .mantine-Paper-root").first
-    scene.wait_for(timeout=60_000)
-    page.wait_for_selector("text=Nervous system", state="attached", timeout=60_000)
-    above, below = scene.bounding_box(), page.get_by_role("button", name="Restart").bounding_box()
-    assert above is not None
-    assert below is not None
-    assert above["y"] + above["height"] < below["y"] < below["y"] + below["height"] < narrow["height"]
-    assert above["height"] > 0.4 * narrow["height"]
-    assert panel.evaluate("panel => panel.clientWidth") == above["width"] == narrow["width"]
-    assert page.evaluate("document.documentElement.scrollWidth") == narrow["width"]
-    wait_for(lambda: scene.evaluate("scene => scene.width") == 2 * narrow["width"], page)
-    assert scene.evaluate("scene => getComputedStyle(scene).backgroundColor") == "rgb(22, 25, 28)"
-    page.close()
-    wait_for(lambda: len(show.clients()) == 1)
-
-
 def test_scrubbing_shows_the_past_and_now_the_present(live: tuple[Show, Page]) -> None:
     show, page = live
     slider(page, "time (s)").press("Home")
@@ -189,30 +163,6 @@ def test_a_click_pokes_the_worm(live: tuple[Show, Page]) -> None:
     [client] = show.clients()
     away = show.stage.picture.middle - client.camera.position
     assert force @ away > 0.8 * np.linalg.norm(force) * np.linalg.norm(away)
-
-
-def test_without_the_token_the_browser_gets_one_sentence(live: tuple[Show, Page], browser: Browser) -> None:
-    show, _ = live
-    page = browser.new_page()
-    answer = page.goto(show.address.rsplit("/", 2)[0])
-    assert answer is not None
-    assert answer.status == 403
-    assert page.get_by_text("opens only under the whole address").count() == 1
-    page.close()
-
-
-def test_another_page_gets_no_websocket_even_with_the_token(live: tuple[Show, Page], browser: Browser) -> None:
-    show, _ = live
-    page = browser.new_page()
-    page.route("http://stranger.test/", lambda route: route.fulfill(body="a page", content_type="text/html"))
-    page.goto("http://stranger.test/")
-    opened = """address => new Promise(tell => {
-        const socket = new WebSocket(address, ["viser-v1.1.1"]);
-        socket.onopen = () => tell("open");
-        socket.onerror = () => tell("refused");
-    })"""
-    assert page.evaluate(opened, show.address.replace("http", "ws").rstrip("/")) == "refused"
-    page.close()
 
 
 @pytest.mark.slow

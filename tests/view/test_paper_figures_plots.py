@@ -11,8 +11,7 @@ import imageio.v3
 import numpy as np
 import pytest
 
-from annelid.analysis import ROBOT_ELONGATION_M
-from annelid.body import Rings, muscle_force
+from annelid.body import Rings
 from annelid.body.worm import WormBody
 from annelid.config import load_config
 from annelid.draw.figures import network_diagram
@@ -20,7 +19,6 @@ from annelid.errors import ConfigError
 from annelid.nervous import Network
 from annelid.nervous.drawing import (
     Words,
-    abbreviations,
     effect_of,
     labels_of,
     lay_out,
@@ -75,27 +73,6 @@ def test_the_other_plants_outlines_keep_their_sides_join_and_draw_neighbours_alo
     assert height[0] == pytest.approx(height[2], rel=0.02)
 
 
-@pytest.mark.parametrize("n", [1, 3, 6])
-def test_rigid_rhombi_keep_their_sides_and_join(n: int) -> None:
-    height = np.random.default_rng(n).uniform(0.065, 0.11, n)
-    outline = planar_models.rigid_outline(height, np.sqrt(4 * 0.073**2 - height**2))
-    assert lengths_of_pieces(outline) == pytest.approx(0.073)
-    assert outline[1:, 0] == pytest.approx(outline[:-1, -1])
-    assert outline[:, 1, 1] == pytest.approx(height / 2)
-    assert np.all(outline[:, [0, -1], 1] == 0)
-
-
-def test_symbols_of_springs_span_what_they_should() -> None:
-    start, end = np.array([1.0, 2.0]), np.array([4.0, 6.0])
-    path = planar_models.zigzag(start, end, 0.3)
-    assert path[[0, -1]] == pytest.approx(np.array([start, end]))
-    off = (path - start) @ np.array([-0.8, 0.6])
-    assert (off.min(), off.max()) == pytest.approx((-0.3, 0.3))
-    turned = planar_models.spiral(start, 0.5, turns=3.0)
-    assert np.linalg.norm(turned - start, axis=1).max() == pytest.approx(0.5)
-    assert turned[-1] == pytest.approx([1.5, 2.0])
-
-
 def test_figure_1(tmp_path: Path) -> None:
     assert planar_models.figure_1_planar_models(tmp_path / "figure_1") == planar_models.CAPTION
     assert_two_good_files(tmp_path / "figure_1.png")
@@ -114,33 +91,6 @@ def rings() -> Rings:
     body = load_config("riddle2023").body
     assert isinstance(body, WormBody)
     return body.muscles
-
-
-@pytest.mark.parametrize("activation", [0.0, 0.4, 1.0])
-def test_the_engine_follows_the_documented_formula(rings: Rings, activation: float) -> None:
-    length, velocity = np.meshgrid(np.linspace(0.3, 2.0, 171), np.linspace(-2.0, 2.0, 81))
-    engine = muscle_surface.engine_flv(length, velocity, rings, activation)
-    assert muscle_force(length, velocity, rings, activation) == pytest.approx(engine, abs=1e-9)
-
-
-def test_the_formula_holds_for_other_muscles_too(rings: Rings) -> None:
-    other = rings.model_copy(
-        update={"minimum_length": 0.4, "maximum_length": 1.9, "lengthening_peak": 1.0, "maximum_velocity": 0.7}
-    )
-    length, velocity = np.meshgrid(np.linspace(0.3, 2.0, 86), np.linspace(-1.0, 1.0, 41))
-    engine = muscle_surface.engine_flv(length, velocity, other)
-    assert muscle_force(length, velocity, other) == pytest.approx(engine, abs=1e-9)
-
-
-def test_the_muscle_at_its_landmarks(rings: Rings) -> None:
-    def force(length: float, velocity: float, activation: float = 1.0) -> float:
-        return float(muscle_surface.engine_flv(length, velocity, rings, activation))
-
-    assert force(1.0, 0.0) == pytest.approx(1.0)
-    assert force(1.0, -rings.maximum_velocity) == 0.0
-    assert force(1.0, 10.0) == pytest.approx(rings.lengthening_peak)
-    assert force(rings.minimum_length, 0.0) == 0.0
-    assert force(rings.maximum_length, 0.0, 0.0) == pytest.approx(1.5 * rings.passive_peak)
 
 
 def test_scaled_lengths_are_the_engines(rings: Rings) -> None:
@@ -242,11 +192,6 @@ def test_every_part_of_a_network_is_drawn_exactly_once(network: Network, tmp_pat
     assert drawn_ids(network, tmp_path) == Counter(expected)
 
 
-def test_a_segment_has_seven_synapses(tmp_path: Path) -> None:
-    ids = [drawn_ids(peristalsis_network(n), tmp_path) for n in (3, 4)]
-    assert [sum(n for one, n in of_network.items() if "synapse" in one) for of_network in ids] == [21, 28]
-
-
 def test_connections_run_from_source_to_target_and_avoid_other_neurons(network: Network) -> None:
     diagram = lay_out(network)
     for link, route in zip(network.connections, diagram.routes, strict=True):
@@ -255,14 +200,6 @@ def test_connections_run_from_source_to_target_and_avoid_other_neurons(network: 
         assert abs(route[0] - diagram.places[link.source]) == pytest.approx(0.27, abs=0.03)
         assert abs(route[-1] - diagram.places[link.target]) == pytest.approx(0.27, abs=0.03)
         assert all(gap > 0.28 for name, gap in nearest.items() if name not in (link.source, link.target))
-
-
-def test_no_two_connections_share_a_path_and_no_two_neurons_a_place(network: Network) -> None:
-    diagram = lay_out(network)
-    middles = np.array([route[len(route) // 2] for route in diagram.routes])
-    for points in (middles, np.array(list(diagram.places.values()))):
-        gaps = abs(points[:, np.newaxis] - points) + 10.0 * np.eye(len(points))
-        assert gaps.min() > 0.1
 
 
 def test_segments_are_columns_from_left_to_right() -> None:
@@ -278,15 +215,6 @@ def test_effects_come_from_reversal_and_rest() -> None:
     effects = [effect_of(network, link) for link in network.connections]
     assert effects[:3] == ["inhibitory", "inhibitory", "excitatory"]
     assert effects[-2:] == ["gap junction", "rectified gap junction"]
-
-
-def test_abbreviations_tell_names_apart() -> None:
-    assert abbreviations(["contraction_1", "control_1", "u_1", "contraction_2"]) == {
-        "contraction": "contra",
-        "control": "contro",
-        "u": "u",
-    }
-    assert abbreviations(["in", "inner"]) == {"in": "in", "inner": "inn"}
 
 
 def test_a_network_without_columns_has_its_names_in_the_neurons_and_long_ones_in_the_key() -> None:
@@ -313,31 +241,7 @@ def test_a_diagram_and_the_figure_of_a_network_have_the_same_parts_and_key(netwo
     assert "input current" in svg or not network.inputs
 
 
-def test_words_stay_clear_of_the_figures_edge(network: Network, tmp_path: Path) -> None:
-    pixels = imageio.v3.imread(network_diagram.network_figure(network, tmp_path / "a.png", conductances=True))[:, :, :3]
-    for edge in (pixels[:4], pixels[-4:], pixels[:, :4], pixels[:, -4:]):
-        assert (edge == 255).all()
-
-
-@pytest.mark.parametrize("conductances", [False, True])
-def test_figure_6(network: Network, tmp_path: Path, conductances: bool) -> None:
-    for suffix in (".svg", ".png", ".pdf"):
-        stem = tmp_path / "figure_6"
-        path = network_diagram.network_figure(network, stem.with_suffix(suffix), conductances=conductances)
-        assert path.stat().st_size > 5000
-    png = path.with_suffix(".png")
-    assert_two_good_files(png)
-    ids = Counter(node.get("id") for node in ElementTree.parse(png.with_suffix(".svg")).iter() if node.get("id"))
-    for name in network.neurons:
-        assert ids[f"neuron-{name}"] == 1
-
-
 # Figure 9
-
-
-def test_the_robots_published_percentages_follow_from_its_elongations() -> None:
-    below = 100 * (1 - np.divide(ROBOT_ELONGATION_M, ROBOT_ELONGATION_M[0]))
-    assert below == pytest.approx([0.0, 37.8, 22.2, 2.75], abs=0.1)
 
 
 def test_figure_9_shows_robot_model_and_every_series(tmp_path: Path) -> None:

@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import math
 import re
 from pathlib import Path
 
@@ -12,12 +11,11 @@ from annelid.analysis.rhombi import actuated, rhombus_plane
 from annelid.body import mesh_of
 from annelid.body.worm import WormBody
 from annelid.config import load_config
-from annelid.draw.camera import fitting_distance, picture_axes, picture_points
-from annelid.draw.scene import Skeleton, render_still
+from annelid.draw.camera import picture_axes
+from annelid.draw.scene import render_still
 from annelid.errors import RenderingUnavailable, RunFileError
 from annelid.morphology import MeshGeometry
 from annelid.simulation.runfile import Run
-from annelid.simulation.worm import compile_worm
 from annelid_studies.riddle2023.figures import renderings
 from annelid_studies.riddle2023.figures.propagation import (
     figure_2_propagation,
@@ -60,14 +58,6 @@ def check_files(png: Path, *, rendered: bool) -> None:
     assert drawing.count("<path") > 20
 
 
-@pytest.mark.parametrize("preset", ["riddle2023-rods", "riddle2023"])
-def test_strand_points_at_rest_are_the_mesh(preset: str) -> None:
-    config = load_config(preset)
-    anatomy = compile_worm(config)
-    strands, _ = Skeleton(anatomy).locate(anatomy.model.qpos0)
-    np.testing.assert_allclose(strands, rest_posture(config).strands_m, atol=1e-6)
-
-
 def test_strands_of_a_recorded_posture_pass_through_the_pins(rods_run: Run) -> None:
     posture = recorded_posture(rods_run, LATE_S)
     geometry = posture.geometry
@@ -90,21 +80,6 @@ def test_an_outline_visits_the_rhombus_corners_and_closes(rods_run: Run) -> None
         assert steps.max() < 1.5 * steps.min(), "it follows the strands and does not jump"
 
 
-def test_picture_points_are_where_a_pinhole_camera_sees_them() -> None:
-    angles, aspect, distance = (52.0, -24.0), 1.6, 3.0
-    right, up, sight = picture_axes(*angles)
-    np.testing.assert_allclose(np.array([right, up, sight]) @ np.array([right, up, sight]).T, np.eye(3), atol=1e-12)
-    half_height = 3.0 * math.tan(math.radians(15.0))
-    seen = picture_points(
-        [np.zeros(3), half_height * up, aspect * half_height * right, sight], *angles, distance, aspect
-    )
-    np.testing.assert_allclose(seen, [[0.5, 0.5], [0.5, 0.0], [1.0, 0.5], [0.5, 0.5]], atol=1e-12)
-    cloud = np.random.default_rng(1).normal(size=(50, 3))
-    shares = picture_points(cloud, *angles, fitting_distance(cloud, *angles, aspect), aspect)
-    assert shares.min() > 0.0
-    assert shares.max() < 1.0
-
-
 @needs_gl
 def test_marks_lie_on_what_was_rendered() -> None:
     config = load_config("riddle2023-rods")
@@ -122,21 +97,6 @@ def test_marks_lie_on_what_was_rendered() -> None:
 
     assert share_of_grey(0) == 1.0, "pins that face the camera"
     assert max(share_of_grey(-9), share_of_grey(9)) < 0.3, "beside them"
-
-
-@needs_gl
-def test_a_still_is_on_white_and_its_rings_are_red_or_as_active() -> None:
-    config = load_config("riddle2023-rods")
-    n = config.body.n_segments
-
-    def red(activation: np.ndarray | None) -> int:
-        pixels = render_still(config, ISOMETRIC_DEG, (400, 300), activation=activation).pixels.astype(int)
-        assert (pixels[0] == 255).all()
-        return int(((pixels[..., 0] > 150) & (pixels[..., 1:].max(axis=-1) < 120)).sum())
-
-    assert red(np.zeros(n)) == 0
-    assert red(np.eye(n)[1]) > 50
-    assert red(None) > 50
 
 
 @pytest.mark.slow

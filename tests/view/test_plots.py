@@ -9,8 +9,7 @@ import imageio.v3
 import numpy as np
 import pytest
 
-from annelid.draw import plots
-from annelid.draw.canvas import activation_color, line_looks, segment_colors
+from annelid.draw.canvas import line_looks, segment_colors
 from annelid.draw.plots import figure7
 from annelid.errors import RunFileError
 from annelid.simulation.runfile import Run
@@ -33,65 +32,19 @@ def test_figure7_of_a_3d_worm_shows_six_sensors(rods_run: Run, picture: Path) ->
     assert figure7(rods_run, picture).stat().st_size > 10_000
 
 
-def test_published_elongations_end_at_lines_that_are_named(rods_run: Run, picture: Path) -> None:
-    from matplotlib.figure import Figure
+def test_lines_differ_in_dashes_in_grey_and_for_colour_blind_readers(subtests: pytest.Subtests) -> None:
+    for n_lines in (2, 3, 4):
+        with subtests.test(f"{n_lines!r:.60}"):
+            from matplotlib.colors import to_rgb
 
-    axes = Figure().subplots()
-    plots._lengths(axes, rods_run, line_looks(3))
-    first_helix = 100.0 * rods_run.data["stretch_length"].values[:, :, 0]
-    expected = first_helix.min(axis=0) + np.array([4.20, 2.55, 4.02])
-    levels = [line for line in axes.lines if np.size(line.get_xdata()) == 2 and line.get_linestyle() == "--"]
-    assert sorted(float(np.asarray(line.get_ydata())[0]) for line in levels) == pytest.approx(sorted(expected))
-    named = [text.get_text().removeprefix("paper: ") for text in axes.texts if text.get_text().startswith("paper")]
-    assert sorted(",".join(named).replace(" ", "").split(",")) == ["1", "2", "3"]
-    other = replace(rods_run, config=rods_run.config.model_copy(update={"published": None}))
-    axes = Figure().subplots()
-    plots._lengths(axes, other, line_looks(3))
-    assert [text.get_text() for text in axes.texts] == ["at rest"]
-
-
-def test_levels_that_coincide_are_both_seen_and_named_together() -> None:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(4.0, 2.0))
-    canvas = FigureCanvasAgg(figure)
-    axes = figure.add_axes((0.0, 0.0, 0.8, 1.0))
-    axes.set_ylim(7.0, 12.0)
-    looks = line_looks(3)
-    plots._draw_levels(axes, [11.0, 9.9, 11.0], looks)
-    assert [text.get_text() for text in axes.texts] == ["paper: 2", "paper: 1, 3"]
-    canvas.draw()
-    row = np.asarray(canvas.buffer_rgba())[40, :320, :3].astype(int)
-    for look in (looks[0], looks[2]):
-        wanted = np.array([int(look["color"][i : i + 2], 16) for i in (1, 3, 5)])
-        assert np.sum(np.abs(row - wanted).max(axis=1) < 60) > 30, "a line hides the other"
-
-
-@pytest.mark.parametrize("n_segments", [1, 3, 4, 8, 60])
-def test_the_legend_names_every_segment_or_evenly_spaced_ones_of_many(n_segments: int) -> None:
-    from matplotlib.figure import Figure
-
-    figure = Figure(layout="constrained")
-    plots._name_segments(figure, line_looks(n_segments), "title")
-    (legend,) = figure.legends
-    named = [int(text.get_text().removeprefix("segment ")) for text in legend.get_texts()]
-    assert (named[0], named[-1]) == (1, n_segments)
-    assert named == list(range(1, n_segments + 1)) or len(named) == 16
-
-
-@pytest.mark.parametrize("n_lines", [2, 3, 4])
-def test_lines_differ_in_dashes_in_grey_and_for_colour_blind_readers(n_lines: int) -> None:
-    from matplotlib.colors import to_rgb
-
-    looks = line_looks(n_lines)
-    assert len({str(look["linestyle"]) for look in looks}) == n_lines
-    linear = np.array([to_rgb(look["color"]) for look in looks]) ** 2.2
-    # What red-blind and green-blind eyes are left with (Vienot et al., 1999).
-    for kept in ([[0.1121, 0.8853, -0.0005]] * 2, [[0.2920, 0.7054, -0.0003]] * 2):
-        seen = np.clip(linear @ np.array([*kept, [0.0, 0.0, 1.0]]).T, 0.0, 1.0) ** (1 / 2.2)
-        apart = np.abs(seen[:, None] - seen).max(axis=2)[~np.eye(n_lines, dtype=bool)]
-        assert apart.min() > 0.15
+            looks = line_looks(n_lines)
+            assert len({str(look["linestyle"]) for look in looks}) == n_lines
+            linear = np.array([to_rgb(look["color"]) for look in looks]) ** 2.2
+            # What red-blind and green-blind eyes are left with (Vienot et al., 1999).
+            for kept in ([[0.1121, 0.8853, -0.0005]] * 2, [[0.2920, 0.7054, -0.0003]] * 2):
+                seen = np.clip(linear @ np.array([*kept, [0.0, 0.0, 1.0]]).T, 0.0, 1.0) ** (1 / 2.2)
+                apart = np.abs(seen[:, None] - seen).max(axis=2)[~np.eye(n_lines, dtype=bool)]
+                assert apart.min() > 0.15
 
 
 def test_figure7_leaves_pyplot_and_the_users_settings_alone(planar_run: Run, picture: Path) -> None:
@@ -115,18 +68,3 @@ def test_a_run_without_samples_is_refused_in_a_sentence(planar_run: Run, picture
     with pytest.raises(RunFileError, match="too little to plot"):
         figure7(empty, picture)
     assert not picture.exists()
-
-
-@pytest.mark.parametrize("n_segments", [3, 4, 6, 12, 60])
-def test_segments_differ_in_greyscale_when_they_are_few(n_segments: int) -> None:
-    from matplotlib.colors import to_rgb
-
-    grey = [np.dot(to_rgb(color), (0.299, 0.587, 0.114)) for color in segment_colors(n_segments)]
-    assert len(grey) == n_segments
-    assert np.all(np.diff(grey) > 0), "dark to light from front to rear"
-
-
-def test_activation_color_stays_within_its_ends() -> None:
-    assert activation_color(-1.0) == activation_color(0.0)
-    assert activation_color(2.0) == activation_color(1.0)
-    assert activation_color(1.0)[0] > 2 * activation_color(1.0)[1]

@@ -6,14 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from matplotlib import colormaps
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from annelid.draw.figures.sweep import (
-    SIGNED,
-    _colors,
     _label,
     _line,
     _map,
@@ -90,13 +86,6 @@ def test_values_stand_in_the_cells_of_a_map_where_they_fit() -> None:
     assert cells(np.zeros((2, 40))) == []
 
 
-def test_numbers_on_both_sides_of_zero_have_signed_colours() -> None:
-    assert _colors(np.array([-0.1, 0.4, np.nan])) == {"cmap": SIGNED, "vmin": -0.4, "vmax": 0.4}
-    assert "vmin" not in _colors(np.array([0.0, 0.4]))
-    red, _, blue, _ = colormaps[SIGNED](1.0)
-    assert blue > red, "forwards is blue"
-
-
 def test_numbers_are_named_in_words_with_their_unit() -> None:
     named = drawn(np.zeros((1, 1)), long_name="speed towards the front")["speed_m_per_s"]
     assert quantity(named) == "speed towards the front (m/s)"
@@ -120,13 +109,3 @@ def test_repeats_have_the_interval_of_students_t() -> None:
     legend = axes.get_legend()
     assert legend is not None
     assert [text.get_text() for text in legend.get_texts()] == ["one run", "mean, 95 % interval"]
-
-
-def test_a_map_of_16_cells_has_no_number_beyond_its_cell() -> None:
-    axes = (figure := Figure(figsize=(3.7, 2.6), layout="constrained")).subplots()
-    canvas = FigureCanvasAgg(figure)
-    _map(figure, axes, drawn(np.full((4, 4), -0.0123)), ["a", "b"], "speed_m_per_s")
-    canvas.draw()
-    (left, _), (right, _) = axes.transData.transform([(0, 0), (1, 0)])
-    assert len(axes.texts) == 16
-    assert max(text.get_window_extent(canvas.get_renderer()).width for text in axes.texts) < right - left

@@ -203,7 +203,6 @@ def test_a_servo_without_a_host_stays_where_it_is() -> None:
 
 
 def test_the_loop_drives_a_pseudo_robot_behind_a_terminal(tmp_path: Path) -> None:
-    pytest.importorskip("serial")
     config = annelid.load_config("riddle2023-rods", {"duration_s": 0.6})
     with pseudo_robot(PseudoRobot(3, 3)) as path:
         link = open_link(path)
@@ -256,7 +255,6 @@ def test_firmware_over_udp_walks_as_python_does(tmp_path: Path) -> None:
 )
 def test_firmware_on_a_cortex_m4_walks_as_python_does(tmp_path: Path) -> None:
     """The same without an operating system, under QEMU, whose serial port is a pseudo-terminal."""
-    pytest.importorskip("serial")
     config = annelid.load_config("riddle2023-rods", {"duration_s": 8.0})
     controller = annelid.build_controller(config, annelid.build_plant(config))
     controller_firmware(controller, "worm", real="float").write(tmp_path, wire=True)

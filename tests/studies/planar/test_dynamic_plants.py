@@ -61,13 +61,12 @@ def waves(plant: DynamicPlanarPlant, contraction_s: float, n: int) -> list:
     return felt
 
 
-@pytest.mark.parametrize("seconds", [2, pytest.param(10, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(("build", "extra"), [(daltorio, {"wall_friction": 0.0}), (boxerbaum, {})])
-def test_without_losses_energy_is_kept(build, extra, seconds: int) -> None:
+def test_without_losses_energy_is_kept(build, extra) -> None:
     plant = squeezed(build(**WITHOUT_LOSSES, **extra), [0.96, 0.9, 0.98])
     start = energy(plant)
     energies = []
-    for _ in range(200 * seconds):
+    for _ in range(400):
         plant.step(np.zeros(3))
         energies.append(energy(plant))
     assert np.abs(np.array(energies) / start - 1.0).max() < 1e-3
@@ -153,14 +152,6 @@ def neighbour_s_share(build, stiffness: float) -> float:
     return float(drop[1] / drop[0])
 
 
-@pytest.mark.slow
-def test_contraction_spreads_to_the_neighbours_the_more_the_stiffer_daltorio_s_springs() -> None:
-    shares = [neighbour_s_share(daltorio, stiffness) for stiffness in (0.0, 0.05, 0.2, 1.0)]
-    assert shares[0] == pytest.approx(0.0, abs=1e-3)
-    assert np.all(np.diff(shares) > 0.0)
-    assert shares[-1] < 1.0
-
-
 def test_contraction_spreads_to_the_neighbours_of_bending_sides_over_a_range() -> None:
     shares = [neighbour_s_share(boxerbaum, stiffness) for stiffness in (0.1, 0.2, 0.5, 1.0)]
     assert shares[0] > 0.0
@@ -172,32 +163,12 @@ def test_contraction_spreads_to_the_neighbours_of_bending_sides_over_a_range() -
     [
         {},
         {"wall_friction": 0.2},
-        pytest.param({"torsion_stiffness_Nm_per_rad": 0.0}, marks=pytest.mark.slow),
-        pytest.param({"pipe_diameter_m": 0.104}, marks=pytest.mark.slow),
-        pytest.param({"joint_mass_kg": 0.02, "vertex_mass_kg": 0.02}, marks=pytest.mark.slow),
-        pytest.param({"wall_friction": 1.0}, marks=pytest.mark.slow),
-        pytest.param({"torsion_stiffness_Nm_per_rad": 0.1}, marks=pytest.mark.slow),
-        pytest.param({"wall_stiffness_N_per_m": 5000.0}, marks=pytest.mark.slow),
-        pytest.param({"height_damping_Ns_per_m": 20.0}, marks=pytest.mark.slow),
     ],
     ids=str,
 )
 def test_in_the_pipe_it_crawls_against_the_wave(changed: dict[str, Any]) -> None:
     felt = waves(daltorio(**changed), 0.4, 4)
     assert felt[-1].center_of_mass_m[0] < felt[0].center_of_mass_m[0] - 0.003
-
-
-@pytest.mark.slow
-def test_the_mirrored_wave_moves_the_worm_as_far_the_other_way() -> None:
-    travelled = []
-    for order in (slice(None), slice(None, None, -1)):
-        plant = daltorio(n_segments=4)
-        start = plant.reset(0).center_of_mass_m[0]
-        end = [held(plant, row[order], 100) for row in np.eye(4)][-1]
-        travelled.append(end.center_of_mass_m[0] - start)
-    # The front tip is a coordinate and the rear one is not, so the mirror holds up to the stepper's error.
-    assert travelled[1] == pytest.approx(-travelled[0], rel=1e-3)
-    assert abs(travelled[0]) > 0.005
 
 
 @BOTH

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -65,16 +64,3 @@ def test_an_outline_of_rhombi_closes_to_rhombi(run: Run) -> None:
     assert found - found[0, 0] == pytest.approx(expected - expected[0, 0], abs=1e-12)
     for left, right in pairwise(found):
         assert left[2] == pytest.approx(right[0])
-
-
-@pytest.mark.parametrize("preset", PRESETS)
-def test_a_continued_run_equals_the_whole_bit_for_bit(preset: str, tmp_path: Path) -> None:
-    def config(duration_s: float):
-        return load_config(preset, {"body.n_segments": 3, "duration_s": duration_s})
-
-    first = simulate(config(0.2), tmp_path / "1", progress=False)
-    second = simulate(config(0.4), tmp_path / "2", resume=first, progress=False)
-    whole = simulate(config(0.4), tmp_path / "3", progress=False).data
-    for name in ("outline", "activation", "muscle_work", "damping_loss", "kinetic_energy"):
-        joined = np.concatenate([first.data[name].values, second.data[name].values])
-        assert np.array_equal(joined, whole[name].values), name

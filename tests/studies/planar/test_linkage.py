@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from annelid_studies.planar.boxerbaum2012 import Boxerbaum2012Body, boxerbaum_linkage
@@ -47,7 +47,8 @@ def test_daltorio_s_rhombi_obey_the_paper_s_relation(seed: int) -> None:
     assert squares == pytest.approx(4 * 0.073**2, rel=1e-12)
 
 
-@pytest.mark.parametrize("seed", range(5))
+@given(seed=st.integers(0, 10**6))
+@settings(max_examples=5, derandomize=True)
 @BOTH
 def test_velocities_and_kinetic_energy_are_those_of_the_lumps(worm: Linkage, seed: int) -> None:
     q, velocity = posture_of(worm, seed)
@@ -56,7 +57,8 @@ def test_velocities_and_kinetic_energy_are_those_of_the_lumps(worm: Linkage, see
     assert velocity @ worm.posture(q).mass @ velocity / 2 == pytest.approx(kinetic, rel=1e-7)
 
 
-@pytest.mark.parametrize("seed", range(5))
+@given(seed=st.integers(0, 10**6))
+@settings(max_examples=5, derandomize=True)
 @BOTH
 def test_forces_are_the_derivatives_of_the_energies(worm: Linkage, seed: int) -> None:
     q, velocity = posture_of(worm, seed)

@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 
 from annelid.config import Clock
 from annelid.errors import ConfigError
-from annelid.protocols import Plant, Records, Stateful
 from annelid_studies.planar import Riddle2022Plant
 from annelid_studies.planar.riddle2022 import PlanarBody
 
@@ -16,13 +15,6 @@ CLOCK = Clock(control_timestep_s=0.001, physics_timestep_s=0.001)
 
 def plant(clock=CLOCK, **body) -> Riddle2022Plant:
     return Riddle2022Plant(PlanarBody(**body), clock)
-
-
-def test_is_a_plant_that_records_and_restores():
-    one: Plant = plant()
-    assert (one.n_segments, one.n_muscles) == (3, 3)
-    assert isinstance(one, Records)
-    assert isinstance(one, Stateful)
 
 
 @given(st.lists(st.lists(st.floats(0, 1), min_size=4, max_size=4), min_size=1, max_size=60))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -58,9 +59,9 @@ def installed(tmp_path: Path) -> Path:
     """A folder as pip would make it of the example package."""
     package = EXTEND / "standing_wave"
     project = tomllib.loads((package / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    (module,) = package.glob("*.py")
-    (tmp_path / module.name).write_text(module.read_text(encoding="utf-8"), encoding="utf-8")
-    about = tmp_path / f"{module.stem}-{project['version']}.dist-info"
+    (folder,) = {path.parent for path in package.glob("*/*.py")}
+    shutil.copytree(folder, tmp_path / folder.name, ignore=shutil.ignore_patterns("__pycache__"))
+    about = tmp_path / f"{folder.name}-{project['version']}.dist-info"
     about.mkdir()
     (about / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: {project['version']}\n")
     lines = [
@@ -87,6 +88,14 @@ def test_a_package_adds_a_kind_by_its_entry_point(installed: Path, monkeypatch: 
     assert told.splitlines() == ["1.0 [1.0, 0.0, 1.0]", "True"]
 
 
+def test_a_package_adds_a_command_and_a_format_by_their_entry_points(installed: Path, finished: Path) -> None:
+    told = answer("-m", "annelid", "rings", str(finished), path=installed)
+    assert re.match(r"ring 1: [0-9.]+ cm\n", told)
+    lengths = installed / "lengths.txt"
+    answer("-m", "annelid", "export", str(finished), "--to", "txt", "-o", str(lengths), path=installed)
+    assert all(float(line) > 0 for line in lengths.read_text().splitlines())
+
+
 @pytest.mark.slow
 def test_the_code_of_another_package_s_kind_is_part_of_a_kept_run_s_key(installed: Path) -> None:
     code = (
@@ -94,7 +103,7 @@ def test_the_code_of_another_package_s_kind_is_part_of_a_kept_run_s_key(installe
         "from annelid.experiment.store import case_key\n"
         "print(case_key(Case('riddle2022-planar', {'controller.kind': 'standing-wave'})))\n"
     )
-    module = installed / "annelid_standing_wave.py"
+    module = installed / "annelid_standing_wave" / "kinds.py"
     text = module.read_text(encoding="utf-8")
     keys = []
     for changed in (text, text.replace("Contracts odd", "Draws in odd"), text.replace("0.5 * (1.0", "0.4 * (1.0")):
@@ -112,9 +121,9 @@ def test_an_unknown_kind_is_refused_without_it() -> None:
 
 
 def test_a_package_that_fails_is_told_of_and_left_out(installed: Path) -> None:
-    (installed / "annelid_standing_wave.py").write_text("raise RuntimeError('broken')\n")
+    (installed / "annelid_standing_wave" / "kinds.py").write_text("raise RuntimeError('broken')\n")
     code = "from annelid import load_config; load_config('riddle2022-planar')"
     environment = os.environ | {"PYTHONPATH": str(installed)}
     command = [sys.executable, "-W", "error::UserWarning", "-c", code]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60, env=environment, check=False)
-    assert "what annelid-standing-wave adds (annelid_standing_wave) cannot be loaded: broken" in done.stderr
+    assert "what annelid-standing-wave adds (annelid_standing_wave.kinds) cannot be loaded: broken" in done.stderr

@@ -2,8 +2,8 @@
 
     python examples/extend/own_outputs.py [folder]
 
-In an installed package, named by an entry point `annelid.kinds`, `annelid draw RUN --figure forces` and
-`annelid export RUN --to txt` find them. Takes a few seconds.
+In an installed package, `annelid draw RUN --figure forces` finds the figure by an entry point `annelid.kinds`, and
+`annelid export RUN --to txt` the format by one of `annelid.formats`. Takes a few seconds.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
     python examples/extend/own_study.py --friction 0.3
 
-In an installed package, named by an entry point `annelid.kinds`, `annelid study slippery` finds it. Its runs are
+In an installed package, named by an entry point `annelid.commands`, `annelid study slippery` finds it. Its runs are
 kept in the folder, so that a second call takes no time. Takes a few seconds.
 """
 
@@ -14,10 +14,8 @@ from typing import Annotated
 
 import typer
 
-from annelid.cli.entry import main, study
-from annelid.cli.result import give_files
-from annelid.experiment.case import Case
-from annelid.experiment.store import Store
+from annelid.cli import give_files, main, study
+from annelid.experiment import Case, Store
 
 
 @study("slippery")
@@ -37,5 +35,5 @@ def slippery(
 
 
 if __name__ == "__main__":
-    sys.argv[1:1] = ["experiment", "slippery"]
+    sys.argv[1:1] = ["study", "slippery"]
     main()

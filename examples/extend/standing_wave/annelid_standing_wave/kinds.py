@@ -1,11 +1,4 @@
-"""A controller of your own as a package: every other segment contracts, then the ones between.
-
-    pip install examples/extend/standing_wave
-    annelid run riddle2023-rods --set controller.kind=standing-wave --set controller.period=1.5
-
-annelid finds it by the entry point `annelid.kinds` in pyproject.toml: its fields are checked, listed and saved with the
-run like any other's.
-"""
+"""A controller: every other segment contracts, then the ones between; its fields are those of any other's."""
 
 from __future__ import annotations
 
@@ -15,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from annelid.config import ControllerKind, Knob
-from annelid.config.sections import Positive
+from annelid.config import ControllerKind, Knob, Positive
 from annelid.control import OpenLoopController
 
 if TYPE_CHECKING:

@@ -123,11 +123,11 @@ def kept_runs(output: Path, *, jobs: int | None, quiet: bool, scheduler: str | N
     Args:
         output: Folder of the study's results.
         jobs: Runs at a time, or None.
-        scheduler: Address of a Dask scheduler, or None for processes of this machine.
+        scheduler: Address of a Dask scheduler whose workers compute; None for processes of this machine.
         quiet: Whether progress is not shown.
 
     Raises:
-        BadParameter: Both jobs and a scheduler are given.
+        BadParameter: Both a scheduler and ``jobs`` are given.
     """
     from annelid.experiment import executors
     from annelid.experiment.progress import study_progress

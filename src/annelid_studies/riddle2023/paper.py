@@ -142,7 +142,9 @@ def kept(stem: Path, made_of: Sequence[object], make: Callable[[], dict[str, Any
         made_of: All that the picture depends on beside annelid's code, of plain numbers, words and lists.
         make: Draws the picture and returns what goes with it, ready for JSON.
     """
-    mark = hashlib.sha256(json.dumps([code_fingerprint("annelid", "annelid_studies"), *made_of]).encode()).hexdigest()
+    mark = hashlib.sha256(
+        json.dumps([code_fingerprint("annelid", "annelid_lab", "annelid_studies"), *made_of]).encode()
+    ).hexdigest()
     note, *pictures = (stem.with_name(f"{stem.name}{suffix}") for suffix in (".json", ".svg", ".png"))
     try:
         content = read_json(note)

@@ -95,7 +95,7 @@ ELSEWHERE = {
     ("annelid", "compare", "--map"): "test_newcomer.py executes it on a log of its own",
     ("annelid", "--install-completion"): "it changes the settings of the shell",
     ("annelid", "--show-completion"): "tests/cli/test_commands.py asks for completions",
-    ("annelid", "study", "gallery"): "tests/docs/test_gallery.py calls it",
+    ("annelid", "study", "gallery"): "tests/docs/test_gallery_list.py calls it",
     ("annelid", "export-network", "network.toml"): "tests/cli/test_commands.py exports such a file",
     ("annelid", "loop"): "it needs hardware; tests/lab/loop/test_hardware_loop.py calls it",
     ("annelid", "pseudo-robot"): "it goes on until it is ended; the same",
@@ -155,7 +155,7 @@ def chosen(command: Command) -> tuple[str, ...]:
 
 def names_only(command: Command) -> bool:
     """Whether it lacks the run that the command needs, as in a sentence about it or one of its options."""
-    needs_run = command.words[1] in ("compare", "export", "plot", "render", "show")
+    needs_run = command.words[1] in ("compare", "draw", "export", "show")
     return needs_run and all(word.startswith("--") for word in command.words[2:])
 
 
@@ -284,7 +284,7 @@ def run_command(command: Command, folder: Path) -> None:
     for option, value in CHANGED_WORDS.items():
         if option in words:
             words[words.index(option) + 1] = value
-    if words[1] == "render" and os.environ.get("MUJOCO_GL") in ("off", "disable"):
+    if words[1] == "draw" and os.environ.get("MUJOCO_GL") in ("off", "disable"):
         return
     answer = CliRunner().invoke(app, [*words[1:], *shorter], prog_name="annelid")
     assert answer.exit_code == 0 or "OpenGL" in answer.output, f"{command}\n{answer.output}"
@@ -305,7 +305,7 @@ def test_what_takes_long_is_executed_in_short(
     monkeypatch.chdir(tmp_path)
     _, shorter = LONG[start]
     words = [word for word in start if not word.startswith("--")]
-    output = () if start[1] in ("limit-cycle",) else ("-o", "out")
+    output = () if "limit-cycle" in start else ("-o", "out")
     answer = CliRunner().invoke(app, [*words[1:], *shorter, *output], prog_name="annelid")
     assert answer.exit_code == 0, answer.output
 

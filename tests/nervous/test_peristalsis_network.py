@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 from annelid.errors import ConfigError
 from annelid.nervous import (
-    HalfCentre,
     Network,
     Neuron,
     PeristalsisParameters,
@@ -92,20 +91,6 @@ def test_interneurons_rest_where_the_rules_say(p):
     network.add_input("stretch", "silenced sensory")
     current = np.full((300, 1), leak * reach)
     assert network.compile().run(current)[-1, 0, 2:] == pytest.approx([reach, 0.0, 0.0], abs=1e-6)
-
-
-@pytest.mark.parametrize(("delta", "oscillates"), [(0.01, True), (1.0, True), (-0.5, False)])
-def test_half_centre_oscillates_only_with_positive_delta(delta, oscillates):
-    p = HalfCentre(bifurcation_mV=delta)
-    conductance = p.inhibition_uS
-    network = Network()
-    network.add_neuron("a", Neuron(channels=(p.sodium_channel,)), 20.0)
-    network.add_neuron("b", Neuron(channels=(p.sodium_channel,)), 0.0)
-    for pre, post in (("a", "b"), ("b", "a")):
-        network.add_synapse(pre, post, Synapse(conductance, -40.0))
-    difference = np.diff(network.compile().run(np.empty((20_000, 0)))[10_000:, 0], axis=1)[:, 0]
-    swings = difference.min() < -10.0 and difference.max() > 10.0
-    assert swings == oscillates
 
 
 def oracle(n: int, steps: int, stretch_on, scheme: str):

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from annelid.errors import ConfigError
-from annelid.nervous import HalfCentre, Network, Neuron, Stepper, add_half_centre, add_hold
+from annelid.nervous import Network, Neuron, Stepper, add_half_centre, add_hold
 from annelid.nervous.neurons import Array
-from annelid.nervous.robust import ROLES, RobustParameters, robust_network, yield_mV, yielding_hold
+from annelid.nervous.robust import ROLES, RobustParameters, robust_network, yielding_hold
 
 BLOCK_MS = 10
 TURN_MS = RobustParameters().turn_ms
@@ -139,14 +139,6 @@ def test_the_turn_is_the_designed_one_and_the_flip(turn_ms: float, n: int) -> No
     assert excess_ms.max() <= 20.0 + 0.03 * turn_ms
 
 
-def test_the_relay_charges_to_where_the_hold_yields_in_a_turn() -> None:
-    p = RobustParameters()
-    relay = robust_network(3, p).neurons["relay_1"]
-    tau_ms = relay.capacitance_nF / (relay.leak_conductance_uS + p.charge_uS)
-    assert p.range_mV * (1.0 - np.exp(-p.turn_ms / tau_ms)) == pytest.approx(yield_mV(p))
-    assert 0.5 * p.range_mV < yield_mV(p) < 0.55 * p.range_mV
-
-
 def test_the_sensor_speeds_up_and_slows_down_within_its_bounds() -> None:
     """A segment that lengthens in its turn hands over earlier; one that lacks its usual stretch, later."""
     n, share, n_turns = 4, RobustParameters().entrainment, 40
@@ -190,12 +182,6 @@ def test_bad_parameters_are_refused(subtests: pytest.Subtests) -> None:
 def test_two_segments_are_refused() -> None:
     with pytest.raises(ConfigError, match="n_segments must be at least 3, not 2"):
         robust_network(2)
-
-
-def test_the_half_centre_of_the_paper_is_kept() -> None:
-    """But for delta: capacitance, range, reversals and gates are the paper's."""
-    own, papers = RobustParameters(), HalfCentre()
-    assert {name for name in vars(papers) if getattr(own, name) != getattr(papers, name)} == {"bifurcation_mV"}
 
 
 @pytest.mark.slow

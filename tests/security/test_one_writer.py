@@ -174,7 +174,7 @@ def test_numbered_folders_are_taken_once(tmp_path: Path, monkeypatch: pytest.Mon
 
     with ThreadPoolExecutor(16) as threads:
         taken = [each.result() for each in [threads.submit(begin) for _ in range(16)]]
-    assert sorted(taken) == [Path("list", "runs", f"worm-{i:03d}") for i in range(1, 17)]
+    assert sorted(taken) == [Path("runs", f"worm-{i:03d}") for i in range(1, 17)]
     # Nothing was written into them.
     assert list(tmp_path.glob("*/*")) == []
 

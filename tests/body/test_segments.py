@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from math import pi, sin
-from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
 import pytest
 
-from annelid import simulate, simulate_batch
 from annelid.body import build_spec, compile_spec, mesh_of
 from annelid.body.assemble import mjcf_text
 from annelid.body.worm import WormBody
@@ -235,19 +233,6 @@ def test_strands_are_stiffened_one_by_one(weightless: dict[str, Any]) -> None:
     assert doubled == pytest.approx(elongation({**weightless, **moduli}, WEAK), rel=1e-6)
     one = elongation({**weightless, "body.strands.relative_stiffness": [2.0] + [1.0] * 11}, WEAK)
     assert doubled[1] < one[1] < elongation(weightless, WEAK)[1]
-
-
-@pytest.mark.slow
-def test_a_batch_of_tapering_worms_is_their_single_runs(tmp_path: Path) -> None:
-    changes = {**TAPERED, "body.strands.young_modulus_Pa": [3e8, 6e8, 3e8], "body.relative_friction": [1.0, 0.5, 2.0]}
-    configs = [load_config(RODS, {**changes, "duration_s": 0.2, "seed": seed}) for seed in (0, 1)]
-    batch = simulate_batch(configs, tmp_path / "batch", progress=False)
-    alone = simulate(configs[0], tmp_path / "alone", progress=False)
-    assert alone.config == configs[0]
-    assert body_of(alone.config).mesh.radius_m == tuple(TAPER_M)
-    for name, values in alone.data.variables.items():
-        if name != "wall_time":
-            assert np.array_equal(values, batch[0].data[name].values, equal_nan=values.dtype.kind == "f"), name
 
 
 def test_the_check_names_the_segment_that_does_not_fit() -> None:

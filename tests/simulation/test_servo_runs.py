@@ -1,4 +1,4 @@
-"""Runs of a worm with servos: continued and batched to the last bit, and walking under the paper's network."""
+"""Runs of a worm with servos: continued to the last bit, and walking under the paper's network."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from small_robot import assert_equal, small_config
 
-from annelid import load_config, open_run, simulate, simulate_batch
+from annelid import load_config, open_run, simulate
 from annelid.analysis import ROBOT_ELONGATION_M, summary
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -32,22 +32,6 @@ def test_in_turns_an_end_and_its_neighbour_elongate_as_the_robot_s(tmp_path: Pat
     errors = np.array(numbers.elongation_mean_max_m)[:2] / ROBOT_ELONGATION_M[:2] - 1.0
     assert abs(errors[0]) <= 0.05
     assert abs(errors[1]) <= 0.15
-
-
-@pytest.mark.slow
-def test_a_batch_is_its_single_runs_bit_for_bit(tmp_path: Path) -> None:
-    own: tuple[dict[str, Any], ...] = (
-        {},
-        {"body.rings.force_limit_N": 6.0, "body.rings.speed_limit_m_per_s": 0.05},
-        {"body.rings.length_range_m": [0.7, 0.98], "sensor.noise_m": 0.002, "body.rings.stiffness_N_per_m": 700.0},
-    )
-    configs = [small_config(**changes) for changes in own]
-    result = simulate_batch(configs, tmp_path / "batch", threads=2, progress=False)
-    for number, one in enumerate(configs):
-        assert_equal(result[number], simulate(one, tmp_path / f"alone-{number}", progress=False))
-    forces = [result[number].data["muscle_force"].values for number in range(3)]
-    assert not np.array_equal(forces[0], forces[1]), "they must differ from one another"
-    assert forces[1].max() <= 6.0
 
 
 def errors_in_turns(source: str | Path, tmp_path: Path, **changes: Any) -> np.ndarray:

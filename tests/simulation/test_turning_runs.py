@@ -1,4 +1,4 @@
-"""Runs of worms that turn: continued and batched to the last bit, mirrored within bounds, steered to a heading."""
+"""Runs of worms that turn: continued to the last bit, mirrored within bounds, steered to a heading."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from small_robot import assert_equal, small_config
 
-from annelid import load_config, open_run, simulate, simulate_batch
+from annelid import load_config, open_run, simulate
 from annelid.analysis import summary
 from annelid.analysis.track import track_of, turn_of
 from annelid.protocols import SIDES
@@ -44,14 +44,6 @@ def test_a_continued_run_is_the_whole_run_bit_for_bit(turning: dict[str, Any], t
     rest = simulate(small_config(**turning), tmp_path / "rest", resume=tmp_path / "first", progress=False)
     assert float(whole.data["half_scale"].min()) < 1.0, "it must turn"
     assert_equal(rest, whole, len(open_run(tmp_path / "first").data["time"]))
-
-
-@pytest.mark.slow
-def test_a_batch_is_its_single_runs_bit_for_bit(tmp_path: Path) -> None:
-    configs = [small_config(**turning) for turning in ({}, LEFT, HEADING)]
-    result = simulate_batch(configs, tmp_path / "batch", threads=2, progress=False)
-    for number, one in enumerate(configs):
-        assert_equal(result[number], simulate(one, tmp_path / f"alone-{number}", progress=False))
 
 
 def test_a_left_turn_takes_from_the_left_muscles(tmp_path: Path) -> None:

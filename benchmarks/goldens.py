@@ -3,9 +3,9 @@
     python benchmarks/goldens.py before.json                     on the code before
     python benchmarks/goldens.py after.json --against before.json    on the code after, same machine
 
-The first two seconds of every preset, each with every recorded variable, and so of a resumed run and a sweep; an episode
-of the environment. With ``--paper`` also the page of claims of `annelid paper --quick`. Hashes hold for one machine and
-one set of libraries: another processor adds in another order.
+The first two seconds of every preset, each with every recorded variable, and so of a resumed run and a sweep; an
+episode of the environment. With ``--paper`` also the page of claims of `annelid paper --quick`. Hashes hold for one
+machine and one set of libraries: another processor adds in another order.
 """
 
 from __future__ import annotations

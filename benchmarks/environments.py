@@ -1,98 +1,58 @@
-"""Environments: steps a second with random actions on one thread and on two, and what a coarse worm costs in accuracy.
+"""Environments: steps a second of many worms in one process and in many, and what a coarse worm costs in accuracy.
 
-    python benchmarks/environments.py throughput [worms] [steps] [rounds]
-    python benchmarks/environments.py share [worms] [steps]
+    python benchmarks/environments.py throughput [vector_environments.csv]
     python benchmarks/environments.py fidelity [docs/results/environments.csv]
 
-The first compares one and two threads in turn within one process and gives the ratio of every round: absolute figures
-differ between machines and hours, so run it where nothing else computes. The second tells how much of a thread's CPU
-time goes to the engine, which steps without Python's lock. The third lets the same wave act on worms of different
-resolution, on open ground and in pipes; its speeds are those of the worm, its times CPU times.
+Steps a second differ between machines and hours: run the first where nothing else computes, with OMP_NUM_THREADS=1. The
+second lets the same wave act on worms of different resolution, on open ground and in pipes; its speeds are those of the
+worm, its times CPU times.
 """
 
 from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from time import perf_counter, process_time, thread_time
-from typing import Any
-from unittest.mock import patch
+from time import perf_counter, process_time
 
 import gymnasium
-import mujoco
 import numpy as np
 
 import annelid.environments  # noqa: F401 -- registers them
-from annelid.environments.single import INTERVAL_S
 from annelid.output import write_csv
 
 FIDELITIES = (("preset's own", None, {}), ("fast", "fast", {}), ("coarse", "coarse", {}), ("preview", "preview", {}))
 COARSER = ("coarse, 40 ms", "coarse", {"clock.physics_timestep_s": 0.04})
-STAGES = "mj_fwdPosition", "mj_fwdVelocity", "mj_step2"
-"""What a step of rods calls of the engine."""
+MODES = ("sync", "async")
 TURN_S = 0.27
 """Time from one segment to the next, about that of the paper's network on this body."""
 
 
-def random_steps_per_s(threads: int, n_worms: int, n_steps: int) -> float:
-    """Steps of single worms a second of wall-clock time, with actions drawn at random; compilation not counted."""
-    envs = gymnasium.make_vec("annelid/Worm-v0", num_envs=n_worms, threads=threads)
+def steps_per_s(mode: str, n_worms: int, seconds: float) -> float:
+    """Steps of single worms a second of wall-clock time, with actions drawn at random; the start is not counted."""
+    envs = gymnasium.make_vec("annelid/Worm-v0", num_envs=n_worms, vectorization_mode=mode)
     envs.reset(seed=0)
     envs.action_space.seed(0)
-    actions = [envs.action_space.sample() for _ in range(n_steps)]
-    began = perf_counter()
-    for action in actions:
-        envs.step(action)
-    seconds = perf_counter() - began
+    envs.step(envs.action_space.sample())
+    began, n_steps = perf_counter(), 0
+    while perf_counter() < began + seconds:
+        envs.step(envs.action_space.sample())
+        n_steps += 1
+    rate = n_worms * n_steps / (perf_counter() - began)
     envs.close()
-    return n_worms * n_steps / seconds
+    return rate
 
 
-def throughput(n_worms: int, n_steps: int, rounds: int) -> None:
-    """Prints steps a second on one thread and on two."""
-    print(f"{n_worms} worms, {n_steps} steps of {INTERVAL_S:g} s, random actions")
-    print("{:>5} {:>10} {:>10} {:>6}".format("load", "1 thread", "2 threads", "2 : 1"))
-    for _ in range(rounds):
+def throughput(path: str = "", seconds: float = 12.0) -> None:
+    """Prints steps a second of worms in this process and in processes of their own, and writes it as CSV."""
+    rows: list[list[object]] = []
+    print("{:>5} {:>6} {:>8} {:>8}".format("load", "worms", *MODES))
+    for n_worms in (1, 8, 64):
         load = os.getloadavg()[0]
-        one, two = (random_steps_per_s(threads, n_worms, n_steps) for threads in (1, 2))
-        print(f"{load:5.1f} {one:10.1f} {two:10.1f} {two / one:6.2f}", flush=True)
-
-
-@contextmanager
-def timed_engine() -> Iterator[list[float]]:
-    """Collects the CPU times of the engine's calls in a step of rods, s."""
-    spent: list[float] = []
-
-    def timed(call: Callable[..., Any]) -> Callable[..., Any]:
-        def called(*arguments: Any) -> Any:
-            began = thread_time()
-            result = call(*arguments)
-            spent.append(thread_time() - began)
-            return result
-
-        return called
-
-    with ExitStack() as stack:
-        for name in STAGES:
-            stack.enter_context(patch.object(mujoco, name, timed(getattr(mujoco, name))))
-        yield spent
-
-
-def share(n_worms: int, n_steps: int) -> None:
-    """Prints how much of the CPU time of steps with random actions is the engine's, on one thread."""
-    envs = gymnasium.make_vec("annelid/Worm-v0", num_envs=n_worms, threads=1)
-    envs.reset(seed=0)
-    envs.action_space.seed(0)
-    with timed_engine() as spent:
-        began = thread_time()
-        for _ in range(n_steps):
-            envs.step(envs.action_space.sample())
-        seconds = thread_time() - began
-    of_one_ms = 1e3 * seconds / (n_worms * n_steps)
-    print(f"{of_one_ms:.1f} ms of CPU time a step of a worm, {sum(spent) / seconds:.0%} in the engine")
+        rows.append([n_worms, *(steps_per_s(mode, n_worms, seconds) for mode in MODES)])
+        print("{:5.1f} {:6} {:8.1f} {:8.1f}".format(load, *rows[-1]), flush=True)
+    if path:
+        write_csv(Path(path), ["worms", *MODES], rows)
 
 
 def timed_wave(time_s: float, n: int) -> np.ndarray:
@@ -136,11 +96,5 @@ def fidelity(path: str = "") -> None:
 
 
 if __name__ == "__main__":
-    what, *numbers = sys.argv[1:] or ["throughput"]
-    if what == "fidelity":
-        fidelity(*numbers)
-    elif what == "share":
-        share(*map(int, [*numbers, *("8", "15")[len(numbers) :]]))
-    else:
-        n, steps, times = [*numbers, *("16", "25", "5")[len(numbers) :]]
-        throughput(int(n), int(steps), int(times))
+    what, *path = sys.argv[1:] or ["throughput"]
+    (fidelity if what == "fidelity" else throughput)(*path)

@@ -3,8 +3,8 @@
     python benchmarks/goldens.py before.json                     on the code before
     python benchmarks/goldens.py after.json --against before.json    on the code after, same machine
 
-The first two seconds of every preset, each with every recorded variable, and so of a resumed run, a batch and a sweep;
-an episode of the environment. With ``--paper`` also the page of claims of `annelid paper --quick`. Hashes hold for one
+The first two seconds of every preset, each with every recorded variable, and so of a resumed run and a sweep; an
+episode of the environment. With ``--paper`` also the page of claims of `annelid paper --quick`. Hashes hold for one
 machine and one set of libraries: another processor adds in another order.
 """
 
@@ -22,7 +22,7 @@ from tempfile import TemporaryDirectory
 import gymnasium
 import numpy as np
 
-from annelid import Run, load_config, preset_names, simulate, simulate_batch, sweep
+from annelid import Run, load_config, preset_names, simulate, sweep
 
 WALL_TIME = "wall_time"
 RODS = "riddle2023-rods"
@@ -52,8 +52,6 @@ def computed(folder: Path, duration_s: float) -> Iterator[tuple[str, str]]:
     half = simulate(load_config(RODS, {**NOISY, "duration_s": duration_s / 2}), folder / "half", progress=False)
     whole = load_config(RODS, {**NOISY, **short})
     yield from hashes("resumed", simulate(whole, folder / "resumed", resume=half, progress=False))
-    for seed, run in enumerate(simulate_batch(whole, folder / "batch", seeds=range(3))):
-        yield from hashes(f"batch, seed {seed}", run)
     study = {
         "name": "goldens",
         "preset": RODS,

@@ -28,9 +28,10 @@ def activation(numbers: np.ndarray, time_s: float, stretch: np.ndarray) -> np.nd
 
 def returns(envs: gymnasium.vector.VectorEnv, numbers: np.ndarray) -> np.ndarray:
     """Sum of rewards of one episode of every worm, each with five numbers of its own, (worms, 5)."""
+    layout = envs.get_attr("layout")[0]
     (observations, _), total, going, time_s = envs.reset(seed=0), 0.0, True, 0.0
     while np.any(going):
-        stretch = envs.unwrapped.layout.named(observations)["stretch_strain"].mean(axis=-1)
+        stretch = layout.named(observations)["stretch_strain"].mean(axis=-1)
         observations, rewards, over, late, infos = envs.step(activation(numbers, time_s, stretch))
         total, going, time_s = total + going * rewards, going & ~(over | late), infos["time_s"].max()
     return total
@@ -38,7 +39,8 @@ def returns(envs: gymnasium.vector.VectorEnv, numbers: np.ndarray) -> np.ndarray
 
 def main(folder: Path, generations: int = 25, **worm: object) -> tuple[float, float]:
     """Learns, prints and draws; returns what eight worms got on average at the start and in the end."""
-    envs = gymnasium.make_vec("annelid.environments:annelid/Worm-v0", num_envs=WORMS, **{"episode_s": 6.0, **worm})
+    name, options = "annelid.environments:annelid/Worm-v0", {"episode_s": 6.0, **worm}
+    envs = gymnasium.make_vec(name, num_envs=WORMS, vectorization_mode="async", **options)
     search = CMA(mean=START, sigma=0.5, population_size=WORMS, seed=1)
     curve = [returns(envs, np.tile(START, (WORMS, 1)))]
     for _ in track(range(generations), description="generations"):
@@ -46,6 +48,7 @@ def main(folder: Path, generations: int = 25, **worm: object) -> tuple[float, fl
         curve.append(returns(envs, asked))
         search.tell(list(zip(asked, -curve[-1], strict=True)))
     start, learned = curve[0].mean(), returns(envs, np.tile(search.mean, (WORMS, 1))).mean()
+    envs.close()
     print(f"return of the start {start:.2f}, learned {learned:.2f}, with {np.round(search.mean, 3).tolist()}")
     with canvas(3.0) as figure:
         axes = figure.subplots(subplot_kw={"xlabel": "generation", "ylabel": "return"})

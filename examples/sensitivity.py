@@ -2,8 +2,8 @@
 
     python examples/sensitivity.py [folder]
 
-Each parameter is raised and lowered by a tenth; all worms run as one batch. Read it beside the error of the numerics:
-period and elongation of this preset hold to 1 or 2 % (docs/speed.md). Takes half a minute on two cores.
+Each parameter is raised and lowered by a tenth; the worms run in processes. Read it beside the error of the numerics:
+period and elongation of this preset hold to 1 or 2 % (docs/speed.md).
 """
 
 from __future__ import annotations
@@ -16,7 +16,8 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from annelid import load_config, simulate_batch, summary
+from annelid import load_config
+from annelid.experiment import Case, Store
 
 PRESET, STEP = "riddle2023-rods", 0.1
 FIELDS = (
@@ -32,14 +33,16 @@ FIELDS = (
 def main(folder: Path, duration_s: float = 6.0) -> None:
     """Runs all variants and prints the table."""
     base = load_config(PRESET, {"duration_s": duration_s})
-    configs = []
+    cases = []
     for field in FIELDS:
         value = base
         for name in field.split("."):
             value = getattr(value, name)
         changes = ({"duration_s": duration_s, field: factor * value} for factor in (1 - STEP, 1 + STEP))
-        configs += [load_config(PRESET, change) for change in changes]
-    results = [summary(run) for run in simulate_batch(configs, folder)]
+        cases += [Case(PRESET, change) for change in changes]
+    store = Store(folder)
+    store.compute(cases)
+    results = [store[case].summary for case in cases]
     table = Table("raised by 1 %", "elongation (%)", "period (%)")
     for field, low, high in zip(FIELDS, results[::2], results[1::2], strict=True):
         length = [np.mean(each.elongation_mean_max_m or np.nan) for each in (low, high)]

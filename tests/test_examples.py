@@ -160,7 +160,7 @@ def test_a_heading_is_told_as_time_goes_on(tmp_path: Path, capsys: pytest.Captur
 
 
 def test_seeds_are_scored_one_by_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    example("batch_over_seeds").main(tmp_path, 0.005, 0.4, range(2))
+    example("scatter_over_seeds").main(tmp_path, 0.005, 0.4, range(2))
     assert "seed 1: too short" in capsys.readouterr().out
 
 
@@ -169,16 +169,6 @@ def test_all_controllers_drive_the_rod_worm(capsys: pytest.CaptureFixture[str]) 
     controllers.main(0.1)
     lines = capsys.readouterr().out.splitlines()
     assert len(lines) == 1 + len(controllers.CONTROLLERS)
-
-
-def test_frictions_run_side_by_side(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    sweep = example("friction_sweep")
-    monkeypatch.setattr(sweep, "SETTINGS", {"duration_s": 0.2, "record.frames_interval_s": 0.2})
-    monkeypatch.setattr(sweep, "FRICTIONS", (0.1, 1.0))
-    sweep.main(tmp_path)
-    assert capsys.readouterr().out.count("complete") == 2
 
 
 def test_one_network_drives_four_bodies(

@@ -25,12 +25,10 @@ if TYPE_CHECKING:
     from annelid.plausibility import check
     from annelid.protocols import Controller, Plant, Sensation
     from annelid.simulation import Run, build_controller, build_plant, open_run, simulate
-    from annelid.simulation.batch import BatchResult, simulate_batch
 
 __version__ = "0.2.0"
 
 __all__ = [
-    "BatchResult",
     "Controller",
     "Finding",
     "Network",
@@ -48,10 +46,10 @@ __all__ = [
     "plot",
     "preset_names",
     "simulate",
-    "simulate_batch",
     "summary",
     "sweep",
     "video",
 ]
 
-__getattr__, __dir__ = lazy(__name__)
+_MANY = "run many worms with annelid.sweep or annelid.experiment.Store, which compute them in processes"
+__getattr__, __dir__ = lazy(__name__, {"simulate_batch": _MANY, "BatchResult": _MANY})

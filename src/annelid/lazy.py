@@ -19,15 +19,16 @@ from importlib import import_module
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     import ast
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
     from typing import Any
 
 
-def lazy(package: str) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
+def lazy(package: str, gone: Mapping[str, str] | None = None) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
     """Returns the ``__getattr__`` and ``__dir__`` of a package, which load its public names on first use.
 
     Args:
         package: The package's ``__name__``.
+        gone: Names that it had, and what to do instead.
     """
 
     @cache
@@ -40,6 +41,9 @@ def lazy(package: str) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
         return offered(ast.parse(Path(file).read_bytes()))
 
     def get(name: str) -> Any:
+        if gone and name in gone:
+            # ``from package import name`` would replace the words of an AttributeError.
+            raise ImportError(f"{package}.{name} has been removed: {gone[name]}")
         if name not in sys.modules[package].__all__:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
         return getattr(import_module(homes()[name]), name)

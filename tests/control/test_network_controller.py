@@ -1,4 +1,4 @@
-"""A user's own network in closed loop: the same as stepped by hand, recorded by name, resumed, batched, and in C."""
+"""A user's own network in closed loop: the same as stepped by hand, recorded by name, resumed, and in C."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from annelid.config.settings import StretchSensor as SensorSection
-from annelid.control import CopySettings, SnsController
+from annelid.control import SnsController
 from annelid.control.sns import Sns
 from annelid.errors import ConfigError
 from annelid.nervous import neuron_names
@@ -220,36 +220,25 @@ def test_a_stride_is_bitwise_so_many_steps(
 
 @settings(max_examples=50)
 @given(
-    chunks=chunk_sizes,
+    n_steps=st.integers(1, 60),
     n_copies=st.integers(1, 9),
+    hysteresis_m=st.sampled_from([0.0, 0.005]),
     hold_s=st.sampled_from([0.0, 0.02, 0.2]),
     seed=st.integers(0, 999),
 )
-def test_copies_with_settings_of_their_own_are_bitwise_single_controllers(chunks, n_copies, hold_s, seed):
+def test_copies_are_bitwise_single_controllers(n_steps, n_copies, hysteresis_m, hold_s, seed):
     rng = np.random.default_rng(seed)
-    sections = [
-        (
-            Sns(kick_nA=rng.uniform(0, 2), sensor_current_nA=rng.uniform(10, 25)),
-            SensorSection(
-                tolerance_m=rng.uniform(0, 0.02), hysteresis_m=rng.choice([0.0, 0.005]), startup_hold_s=hold_s
-            ),
-        )
-        for _ in range(n_copies)
-    ]
-    singles = [SnsController(sns, sensor, 3, 3, 0.001) for sns, sensor in sections]
-    batch = controller(sensor=SensorSection(startup_hold_s=hold_s))
-    each = CopySettings.of(single.own for single in singles)
+    section = SensorSection(hysteresis_m=hysteresis_m, startup_hold_s=hold_s)
+    singles = [controller(sensor=section, kick_nA=2.0) for _ in range(n_copies)]
     first = [one.get_state() for one in singles]
     states = {name: np.stack([state[name] for state in first]) for name in first[0]} | {"n_steps": np.array(0)}
-    taken = 0
-    for n_steps in chunks:
+    for taken in range(n_steps):
         alike = [sensation(taken * 0.001, rng.uniform(-0.01, 0.03, 3)) for _ in singles]
         together = replace(alike[0], stretch_m=np.stack([felt.stretch_m for felt in alike]))
-        states, activation = batch.step_copies(states, together, n_steps, each)
-        taken += n_steps
-        assert int(states["n_steps"]) == taken
+        states, activation = controller(sensor=section, kick_nA=2.0).step_copies(states, together)
+        assert int(states["n_steps"]) == taken + 1
         for copy, (one, felt) in enumerate(zip(singles, alike, strict=True)):
-            np.testing.assert_array_equal(activation[copy], one.stride(felt, n_steps))
+            np.testing.assert_array_equal(activation[copy], one.step(felt))
             alone = one.get_state()
             for name in ("potential", "gate", "sensor_on"):
                 np.testing.assert_array_equal(states[name][copy], alone[name])

@@ -19,7 +19,6 @@ from annelid.experiment import Case, Store, case_key, fingerprint
 from annelid.experiment.executors import Processes
 from annelid.protocols import Plant, Sensation
 from annelid.simulation import WormPlant, build_controller, simulate
-from annelid.simulation.batch import simulate_batch
 
 N, STEP_S = 3, 0.01
 PLANAR: dict[str, Any] = {"duration_s": 1.0}
@@ -227,16 +226,13 @@ def test_a_push_is_to_the_left_and_ends(tmp_path: Path) -> None:
         assert speed[:-1] == pytest.approx(0.1 / mass, rel=0.05)
 
 
-def test_what_does_not_fit_is_refused(tmp_path: Path) -> None:
+def test_what_does_not_fit_is_refused() -> None:
     with pytest.raises(ConfigError, match=r"trial.weak_segment = 4: must be in 1 .. 3"):
         load_config("riddle2023-rods", {"trial.weak_segment": 4})
     with pytest.raises(ConfigError, match=r"trial.push_N = 1: body.kind = 'riddle2022' cannot be pushed"):
         load_config("riddle2022-planar", {"trial.push_N": 1.0})
     with pytest.raises(ConfigError, match=r"trial.loss.*1.5"):
         load_config("riddle2023-rods", {"trial.loss": 1.5})
-    pushed = load_config("riddle2023-rods", {"trial.push_N": 1.0})
-    with pytest.raises(ConfigError, match=r"trial.push_N = 1: worms of a batch"):
-        simulate_batch(pushed, tmp_path, n_worms=2)
 
 
 @pytest.fixture

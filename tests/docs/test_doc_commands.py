@@ -223,7 +223,7 @@ def test_an_unknown_option_field_or_preset_is_found() -> None:
         "annelid run --set arena.frictoin=0.3",
         "annelid sing",
         "pytest tests/test_nothing.py",
-        "python benchmarks/batch_throughput.py --elephants 2",
+        "python benchmarks/environments.py --elephants 2",
     ):
         check = check_annelid if line.startswith("annelid") else check_program
         with pytest.raises((Exception, SystemExit)):

@@ -47,7 +47,6 @@ EXCEPTIONS = {
 """Tables of numbers without a result file, by page and first head, and why."""
 
 NO_WORM = {
-    "batch_throughput.csv": "speeds on one machine",
     "bench.json": "every case names the digest of its own configuration",
     "loop.csv": "times of a loop with a pseudo-robot",
     "robust_network.csv": "networks without a body",

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from worms import CHEAP
 
-from annelid.environments import WormEnv, WormVectorEnv
+from annelid.environments import WormEnv
 from annelid_studies.riddle2023.figures.renderings import rendering_works
 
 needs_gl = pytest.mark.skipif(not rendering_works(), reason="no OpenGL back-end works on this machine")
@@ -28,18 +28,6 @@ def test_a_picture_shows_the_worm_as_it_is_now() -> None:
     assert first.dtype == np.uint8
     assert first.std() > 5.0
     assert np.abs(first.astype(int) - then).max() > 20
-
-
-@needs_gl
-def test_worms_in_different_arenas_are_drawn_side_by_side() -> None:
-    changes = [CHEAP["changes"] | {"arena.radius": radius} for radius in (0.3, 0.8, 0.3)]
-    envs = WormVectorEnv(3, CHEAP["preset"], changes, arena="pipe.bend", **SMALL)
-    envs.reset(seed=[1, 1, 1])
-    pictures = envs.render()
-    envs.close()
-    assert pictures is not None
-    assert np.array_equal(pictures[0], pictures[2])
-    assert not np.array_equal(pictures[0], pictures[1])
 
 
 def test_without_a_render_mode_there_are_none() -> None:

@@ -73,9 +73,7 @@ def test_passing_is_success_and_ends_the_episode() -> None:
     told, k = [], 0
     while not told or not (told[-1].terminated or told[-1].truncated):
         action = (np.arange(3) == (k // 3) % 3).astype(float)
-        for activation in episode.activations(action):
-            episode.observe(worm.step(activation))
-        told.append(episode.outcome(action, random))
+        told.append(episode.step(action, random))
         k += 1
     assert told[-1].terminated
     assert told[-1].info["is_success"]

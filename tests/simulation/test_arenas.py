@@ -1,4 +1,4 @@
-"""Worms in arenas: they rest on the ground, stay inside, slide as friction says, and compute the same in a batch."""
+"""Worms in arenas: they rest on the ground, stay inside, and slide as friction says."""
 
 from __future__ import annotations
 
@@ -13,8 +13,7 @@ import pytest
 from annelid.arena.ground import surface_of
 from annelid.config import RunConfig, load_config
 from annelid.errors import ConfigError
-from annelid.protocols import Array, Sensation
-from annelid.simulation.batch import compile_worms
+from annelid.protocols import Array
 from annelid.simulation.ground import facing
 from annelid.simulation.loop import simulate
 from annelid.simulation.stepping import build_controller
@@ -40,10 +39,6 @@ def settled(plant: WormPlant, duration_s: float, activation: Array | None = None
     for _ in range(round(duration_s / plant._config.clock.physics_timestep_s)):
         plant.stride(np.tile(pull, (plant.steps_to_move(), 1)))
     return plant
-
-
-def batch(configs: list[RunConfig]) -> list[WormPlant]:
-    return [WormPlant(*each) for each in zip(configs, compile_worms(configs), strict=True)]
 
 
 def reset(made: RunConfig) -> WormPlant:
@@ -135,28 +130,6 @@ def test_setae_slide_forwards_as_a_block_does_and_hold_backwards() -> None:
     assert accelerations.mean() == pytest.approx(expected, rel=0.05)
     up, _ = sliding(20.0)
     assert np.abs(up[3:]).max() < 0.01 * down[-1]
-
-
-def test_a_batch_computes_the_same_bits_in_an_arena() -> None:
-    configs = [config("setae"), config("setae", arena__friction=0.6), config("setae")]
-    worms = batch(configs)
-    alone = [reset(made) for made in configs]
-    pull = np.tile([1.0, 0.0, 0.3], (alone[0].steps_to_move(), 1))
-    felt: list[Sensation] = []
-    for _ in range(10):
-        felt = [worm.stride(pull) for worm in worms]
-        for plant, ours in zip(alone, felt, strict=True):
-            theirs = plant.stride(pull)
-            assert np.array_equal(ours.center_of_mass_m, theirs.center_of_mass_m)
-            assert np.array_equal(ours.contact_force_N, theirs.contact_force_N)
-    assert not np.array_equal(felt[0].center_of_mass_m, felt[1].center_of_mass_m)
-    assert np.array_equal(felt[0].center_of_mass_m, felt[2].center_of_mass_m)
-
-
-def test_worms_in_pipes_of_different_shapes_make_one_batch() -> None:
-    configs = [config("pipe.bend"), config("pipe.helix"), config("pipe.taper")]
-    for worm in batch(configs):
-        assert worm.step(np.zeros(3)).center_of_mass_m[2] == pytest.approx(0.16, abs=0.02)
 
 
 def test_a_run_in_an_arena_continues_bit_for_bit(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from small_robot import assert_equal, small_config
 
-from annelid import load_config, simulate, simulate_batch
+from annelid import load_config, simulate
 from annelid.analysis import summary
 from annelid.analysis.gait import gait, slip_cost
 from annelid.analysis.track import track_of
@@ -91,13 +91,6 @@ def test_a_turned_worm_moves_and_feels_as_one_that_is_not(kind: str, heading: fl
     assert leading.touch.slip_distance == pytest.approx(straight.touch.slip_distance, abs=near)
     assert leading.touch.slip_loss == pytest.approx(straight.touch.slip_loss, abs=20.0 * near)
     assert leading.elastic_energy_J() == pytest.approx(straight.elastic_energy_J(), rel=20.0 * near)
-
-
-def test_worms_of_all_headings_share_a_batch_and_a_model_and_are_their_single_runs(tmp_path: Path) -> None:
-    configs = [small_config(**{"body.heading_deg": heading, "duration_s": 0.2}) for heading in (0.0, 45.0)]
-    result = simulate_batch(configs, tmp_path / "batch", threads=2, progress=False)
-    for number, one in enumerate(configs):
-        assert_equal(result[number], simulate(one, tmp_path / f"alone-{number}", progress=False))
 
 
 @pytest.mark.slow

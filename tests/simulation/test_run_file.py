@@ -354,7 +354,7 @@ def test_a_disk_that_fills_up_ends_the_run_with_a_readable_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, at_write: int
 ) -> None:
     """Every write from the given one on fails with ENOSPC after taking half of its bytes."""
-    monkeypatch.setattr(loop.Loop, "flush_interval_s", 0.0)
+    monkeypatch.setattr(loop.RecordedRun, "flush_interval_s", 0.0)
     monkeypatch.setattr(container, "open", lambda *args, **options: FullDisk(*args, **options), raising=False)
 
     class FullDisk:
@@ -391,7 +391,7 @@ def test_a_disk_that_fills_up_ends_the_run_with_a_readable_file(
 
 
 def test_a_disk_that_recovers_for_the_last_words_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(loop.Loop, "flush_interval_s", 0.0)
+    monkeypatch.setattr(loop.RecordedRun, "flush_interval_s", 0.0)
     whole = RawWriter.write
 
     def write(self: RawWriter, name: str, content: Any, skip_bytes: int = 0) -> None:

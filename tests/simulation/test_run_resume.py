@@ -71,7 +71,7 @@ def test_continued_planar_run_equals_the_whole_bit_for_bit(tmp_path: Path) -> No
 def test_a_run_stopped_by_its_guard_goes_on_from_its_last_checkpoint(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(loop.Loop, "checkpoint_interval_s", 0.0)
+    monkeypatch.setattr(loop.RecordedRun, "checkpoint_interval_s", 0.0)
     monkeypatch.setattr(loop, "_CHECKPOINT_SHARE", 1e9)
     config = toy_config(**NOISY)
     with pytest.raises(SimulationStopped):
@@ -146,7 +146,7 @@ def test_parts_that_cannot_be_restored_cannot_continue(tmp_path: Path) -> None:
 
 
 def test_the_newest_slot_is_used_and_a_torn_one_is_not(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(loop.Loop, "checkpoint_interval_s", 0.0)
+    monkeypatch.setattr(loop.RecordedRun, "checkpoint_interval_s", 0.0)
     monkeypatch.setattr(loop, "_CHECKPOINT_SHARE", 1e9)
     run = toy_run(toy_config(), tmp_path)
     assert read_checkpoint(run.path).step == 200

@@ -16,7 +16,6 @@ from annelid.body.assemble import mjcf_text
 from annelid.draw.scene import DrawnWorm
 from annelid.errors import ConfigError
 from annelid.simulation import Run
-from annelid.simulation.batch import compile_worms
 from annelid.simulation.worm import WormPlant
 
 ROOT = Path(__file__).parents[2]
@@ -211,21 +210,6 @@ def test_pictures_show_things_where_they_are(tmp_path: Path) -> None:
     # The camera keeps to the worm.
     ends = drawn.part_ends(run.data["qpos"].values[-1])
     assert ends[:, 0].min() > run.data["crossing_position"].values[..., 0].min() - 0.1
-
-
-def test_a_batch_computes_the_same_bits_in_a_scene() -> None:
-    configs = [config(BOX), config(BOX, changes={"arena.friction": 0.6})]
-    worms = [WormPlant(*each) for each in zip(configs, compile_worms(configs), strict=True)]
-    alone = [WormPlant(made) for made in configs]
-    pushed_N = 0.0
-    for _ in range(40):
-        for worm, plant in zip(worms, alone, strict=True):
-            ours, theirs = worm.step(np.ones(3)), plant.step(np.ones(3))
-            assert np.array_equal(ours.center_of_mass_m, theirs.center_of_mass_m)
-            for name in ("object_position", "object_force", "touch", "slip_distance", "potential_energy"):
-                assert np.array_equal(worm.read(False)[name], plant.read(False)[name]), name
-        pushed_N = max(pushed_N, float(np.abs(alone[0]._forces.met.force).max()))
-    assert pushed_N > 0.01
 
 
 def test_a_heading_turns_the_worm_and_leaves_the_scene() -> None:

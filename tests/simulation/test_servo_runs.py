@@ -1,4 +1,4 @@
-"""Runs of a worm with servos: continued and batched to the last bit, and walking under the paper's network."""
+"""Runs of a worm with servos: continued to the last bit, and walking under the paper's network."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Runs of worms that turn: continued and batched to the last bit, mirrored within bounds, steered to a heading."""
+"""Runs of worms that turn: continued to the last bit, mirrored within bounds, steered to a heading."""
 
 from __future__ import annotations
 

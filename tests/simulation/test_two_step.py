@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +11,10 @@ import numpy as np
 import pytest
 
 from annelid.config import load_config
+from annelid.errors import SimulationStopped
 from annelid.simulation.adjust import adjusted
-from annelid.simulation.batch import compile_worms
 from annelid.simulation.stepping import build_controller, start
+from annelid.simulation.two_step import TwoStep
 from annelid.simulation.worm import WormPlant
 
 COARSE = {"body.mesh.elements_per_side": 1}
@@ -86,17 +88,15 @@ def test_in_a_scene_whose_bodies_move_the_step_is_the_engine_s(tmp_path: Path) -
     assert np.abs(worm.engine["qvel"][-7:-1]).max() < 1e-3
 
 
-def test_a_batch_s_worms_have_numbers_of_their_own() -> None:
-    config = load_config("riddle2023-rods", COARSE)
-    worms = [WormPlant(config, anatomy) for anatomy in compile_worms([config, config])]
-    alone, pull = WormPlant(config), np.array([0.2, 0.6, 1.0])
-    for worm in (alone, *worms):
-        worm.reset(0)
-    worms[0].move(pull[::-1], 3)
-    for worm in (alone, worms[1]):
-        worm.move(pull, 4)
-    assert np.array_equal(alone.qpos, worms[1].qpos)
-    assert not np.array_equal(worms[0].model.wrap_prm, worms[1].model.wrap_prm)
+def test_an_error_of_the_engine_stops_the_worm_with_its_words(monkeypatch: pytest.MonkeyPatch) -> None:
+    def failing(own: TwoStep, prepare: Callable[[], None]) -> None:
+        raise mujoco.FatalError("broken")
+
+    worm = plant("riddle2023-rods", **COARSE)
+    worm.step(np.zeros(3))
+    monkeypatch.setattr(TwoStep, "step", failing)
+    with pytest.raises(SimulationStopped, match=r"the engine stopped at 0\.000 s: broken"):
+        worm.move(np.zeros(3), 1)
 
 
 def test_a_clock_that_changes_while_it_runs_starts_from_rest() -> None:

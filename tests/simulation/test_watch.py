@@ -1,4 +1,4 @@
-"""Guards on a worm's shape, and warnings: nonsense stops, doubt is recorded, alone, in a batch and after a resume."""
+"""Guards on a worm's shape, and warnings: nonsense stops, doubt is recorded, also after a resume."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import xarray
 
-from annelid import load_config, open_run, simulate, simulate_batch, summary
+from annelid import load_config, open_run, simulate, summary
 from annelid.body import mesh_of
 from annelid.body.worm import WormBody
 from annelid.config import RunConfig
@@ -194,9 +194,8 @@ def test_a_ring_that_collapses_stops_the_run(preset: str, changes: dict[str, Any
 
 def test_a_setup_that_can_mean_nothing_is_refused_before_anything_is_written(tmp_path: Path) -> None:
     thin = load_config("wang", {"body.mesh.radius_m": 0.05})
-    for run in (lambda: simulate(thin, tmp_path / "run"), lambda: simulate_batch(thin, tmp_path / "run", n_worms=2)):
-        with pytest.raises(ConfigError, match=r"even the shortest cable of 0\.45 m pulls 0 N; set \[0\.195, 0\.3\]"):
-            run()
+    with pytest.raises(ConfigError, match=r"even the shortest cable of 0\.45 m pulls 0 N; set \[0\.195, 0\.3\]"):
+        simulate(thin, tmp_path / "run")
     assert list(tmp_path.iterdir()) == []
 
 
@@ -229,12 +228,10 @@ def test_a_cable_that_stays_slack_is_told(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_batch_and_a_resumed_run_have_the_warnings_of_a_single_one(tmp_path: Path) -> None:
+def test_a_resumed_run_has_the_warnings_of_a_whole_one(tmp_path: Path) -> None:
     others: tuple[dict[str, Any], ...] = ({}, {"sensor.tolerance_m": 0.05}, {"body.rings.length_range_m": [0.62, 0.96]})
     configs = [load_config("wang", SLACK | other) for other in others]
-    batch = simulate_batch(configs, tmp_path / "batch", threads=1, progress=False)
     single = [simulate(config, tmp_path / f"single{i}", progress=False) for i, config in enumerate(configs)]
-    assert [run.warnings for run in batch] == [run.warnings for run in single]
     assert len({run.warnings for run in single}) == 3
     half = simulate(load_config("wang", SLACK | {"duration_s": 0.16}), tmp_path / "half", progress=False)
     assert simulate(configs[0], tmp_path / "rest", resume=half, progress=False).warnings == single[0].warnings

@@ -1,4 +1,4 @@
-"""What is read of many worms at once is, to the last bit, what is read of each alone."""
+"""What is read of a compiled worm, and that strides are its steps."""
 
 from __future__ import annotations
 
@@ -8,8 +8,6 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from annelid.body import build_spec, compile_spec
 from annelid.config import load_config
@@ -27,35 +25,6 @@ SMALL = {"body.mesh.elements_per_side": 2, "body.mesh.n_helices": 8}
 @cache
 def anatomy(body: str) -> Anatomy:
     return compile_worm(load_config("riddle2023-rods", SMALL | BODIES[body]))
-
-
-@pytest.mark.parametrize("body", BODIES)
-@settings(max_examples=20)
-@given(n_worms=st.integers(1, 9), seed=st.integers(0, 1000))
-def test_many_worms_read_like_each_alone(body: str, n_worms: int, seed: int) -> None:
-    part, random = anatomy(body), np.random.default_rng(seed)
-    model = part.model
-    shapes = {
-        "actuator_force": (model.nu,),
-        "sensordata": (model.nsensordata,),
-        "flexedge_length": (model.nflexedge,),
-        "qpos": (model.nq,),
-        "xpos": (model.nbody, 3),
-        "xmat": (model.nbody, 9),
-    }
-    engine = {name: random.normal(size=(n_worms, *shapes[name])) for name in part.outputs}
-    crossing, center = random.normal(size=(n_worms, part.geometry.n_crossings, 3)), random.normal(size=(n_worms, 3))
-    skin = random.normal(size=(n_worms, len(part.skin.segment), 3))
-    objects = np.empty((n_worms, 0, 3))
-    posture, (forces, ground) = part.posture(crossing, center, skin, objects), part.forces(engine)
-    for i in range(n_worms):
-        alone, ground_alone = part.forces({name: values[i] for name, values in engine.items()})
-        assert np.array_equal(ground[i], ground_alone)
-        for of_many, of_one in ((posture, part.posture(crossing[i], center[i], skin[i], objects[i])), (forces, alone)):
-            for field in of_one._fields:
-                if field == "met":
-                    continue
-                assert np.array_equal(getattr(of_many, field)[i], getattr(of_one, field)), field
 
 
 def test_lengths_are_the_distances_along_springs_and_rings() -> None:

@@ -12,7 +12,7 @@ from annelid.control.base import (
 from annelid.control.network import NetworkController, Sense
 from annelid.control.open_loop import ProgramController, SineController, TimedController
 from annelid.control.own import own_controller
-from annelid.control.sns import DRIVE_HINT, AdaptiveController, CopySettings, SnsController, paper_controller
+from annelid.control.sns import DRIVE_HINT, AdaptiveController, SnsController, paper_controller
 from annelid.control.stretch_sensor import StretchSensor, lengthening_m
 from annelid.lazy import moved
 
@@ -23,7 +23,6 @@ __all__ = [
     "CallableController",
     "Coded",
     "ControllerCode",
-    "CopySettings",
     "NetworkController",
     "OpenLoopController",
     "ProgramController",

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Hashable, Iterable, Iterator
-from dataclasses import asdict, astuple, dataclass
+from collections.abc import Iterator
+from dataclasses import asdict
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, Generic, Literal, Self, TypeVar, cast
+from typing import Any, Generic, Literal, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,37 +70,12 @@ def paper_controller(controller: ControllerKind) -> Sns | None:
     return controller if isinstance(controller, Sns) else None
 
 
-@dataclass(frozen=True, slots=True)
-class CopySettings:
-    """What may differ between copies that are advanced together: one number for all, or an array ``(n_copies,)``.
-
-    Attributes:
-        tolerance_m: Tolerance of the stretch sensors, m.
-        hysteresis_m: Their hysteresis, m.
-        sensor_current_nA: Current of a sensor that is on, nA.
-        kick_nA: Current of the first step, nA.
-    """
-
-    tolerance_m: float | Array
-    hysteresis_m: float | Array
-    sensor_current_nA: float | Array
-    kick_nA: float | Array
-
-    @classmethod
-    def of(cls, copies: Iterable[Self]) -> Self:
-        """Returns those of all copies, each given with one number."""
-        return cls(*np.array([astuple(one) for one in copies]).reshape(-1, 4).T)
-
-
 class PeristalsisController(NeuralController, Generic[Config]):
     """A controller of the paper's network, or of one that extends it, gated by stretch sensors.
 
     One step, from t to t + dt: the lengths sensed at t switch the sensors, whose currents act on the network
     during the whole step; the activation is read from the potentials at t + dt and drives the body from t on.
     This is the order of the authors' loop. The kick acts during the first step only.
-
-    Attributes:
-        own: What may differ between copies that are advanced together.
 
     Raises:
         ConfigError: Fewer than 3 segments, muscles that are neither one nor two per segment, network parameters for
@@ -129,7 +104,6 @@ class PeristalsisController(NeuralController, Generic[Config]):
         self._range_mV, self._full_nA = sns.range_mV, sns.leak_conductance_uS * sns.range_mV
         self._timestep_s = control_timestep_s
         self._sensor = StretchThreshold(sensor, n_segments)
-        self.own = CopySettings(sensor.tolerance_m, sensor.hysteresis_m, sns.sensor_current_nA, sns.kick_nA)
         super().__init__(
             self._network(n_segments),
             peristalsis.ROLES,
@@ -169,12 +143,10 @@ class PeristalsisController(NeuralController, Generic[Config]):
 
     def stride(self, sensation: Sensation, n_steps: int) -> Array:
         """Advances by control steps, as `annelid.protocols.StridingController.stride`."""
-        pieces = self._inputs(self._now, sensation, n_steps, self.own)
+        pieces = self._inputs(self._now, sensation, n_steps)
         return self._activation(np.concatenate([self._advance(inputs_nA, n) for n, inputs_nA in pieces]))
 
-    def _inputs(
-        self, now: dict[str, NDArray[Any]], sensation: Sensation, n_steps: int, each: CopySettings
-    ) -> Iterator[tuple[int, Array]]:
+    def _inputs(self, now: dict[str, NDArray[Any]], sensation: Sensation, n_steps: int) -> Iterator[tuple[int, Array]]:
         """Yields numbers of steps and the inputs' currents during them, nA, for one network or many copies.
 
         Replaces ``sensor_on`` and ``n_steps`` of the state. All arrays of copies have one more axis in front.
@@ -183,14 +155,14 @@ class PeristalsisController(NeuralController, Generic[Config]):
         first = round(sensation.time_s / self._timestep_s)
         times_s = [sensation.time_s, *((first + k) * self._timestep_s for k in range(1, n_steps))]
         longer = self._lengthening(sensation, n_steps)
-        on = self._sensor.readings(now["sensor_on"], longer, times_s, each.tolerance_m, each.hysteresis_m)
+        on = self._sensor.readings(now["sensor_on"], longer, times_s)
         changes = np.any(on[1:] != on[:-1], axis=tuple(range(1, on.ndim)))
         cuts = {0, n_steps, *(np.flatnonzero(changes) + 1).tolist()}
         cuts |= set(range(n_steps)) if self._every_step_differs else {1} if taken == 0 else set()
         for start, end in pairwise(sorted(cuts)):
             inputs_nA = np.zeros(on.shape[1:-1] + shape)
-            inputs_nA[..., :n_segments] = each.sensor_current_nA * on[start]
-            inputs_nA[..., n_segments] = each.kick_nA if taken + start == 0 else 0.0
+            inputs_nA[..., :n_segments] = self._sns.sensor_current_nA * on[start]
+            inputs_nA[..., n_segments] = self._sns.kick_nA if taken + start == 0 else 0.0
             further = inputs_nA[..., n_segments + 1 :]
             self._set_further(further, sensation, longer[start], times_s[start], taken + start)
             yield end - start, inputs_nA
@@ -216,7 +188,14 @@ class PeristalsisController(NeuralController, Generic[Config]):
         return self._code(
             senses=("lengthening_m", *further.get("senses", ())),
             inputs=inputs + further.get("inputs", ""),
-            constants={**asdict(self.own), "hold_steps": hold_steps, **further.get("constants", {})},
+            constants={
+                "tolerance_m": self._sensor.settings.tolerance_m,
+                "hysteresis_m": self._sensor.settings.hysteresis_m,
+                "sensor_current_nA": self._sns.sensor_current_nA,
+                "kick_nA": self._sns.kick_nA,
+                "hold_steps": hold_steps,
+                **further.get("constants", {}),
+            },
             state={"sensor_on": np.zeros(self._n_segments)},
         )
 
@@ -229,7 +208,7 @@ class SnsController(PeristalsisController[Sns]):
     """Drives a worm by the synthetic nervous system of Riddle et al. 2022 and 2023, as `PeristalsisController` does.
 
     A segment's activation is that of `annelid.control.base.NeuralController`: ``"sigmoid"`` as in Riddle et al. 2023,
-    ``"linear"`` as in Riddle et al. 2022. Many copies of it can be advanced at once.
+    ``"linear"`` as in Riddle et al. 2022. Copies of it can be advanced at once, as a search for a limit cycle does.
 
     Raises:
         ConfigError: As `PeristalsisController`.
@@ -238,57 +217,40 @@ class SnsController(PeristalsisController[Sns]):
     name = "synthetic nervous system"
 
     @cached_property
-    def alike(self) -> Hashable:
-        """Equal for controllers that can be advanced together as copies, which may differ in `own`."""
-        differing = {"sensor_current_nA", "kick_nA"}
-        return self._config.model_dump_json(exclude=differing), self._sensor.settings.startup_hold_s
-
-    @cached_property
-    def _batches(self) -> dict[int, tuple[Stepper, NetworkState]]:
+    def _copies(self) -> dict[int, tuple[Stepper, NetworkState]]:
         return {}
 
     def _network(self, n_segments: int) -> Network:
         return peristalsis.peristalsis_network(n_segments, self._parameters)
 
-    def step_copies(
-        self, states: State, sensation: Sensation, n_steps: int = 1, each: CopySettings | None = None
-    ) -> tuple[State, Array]:
-        """Advances many copies at once, each as `stride` does one, bit for bit; changes nothing here.
+    def step_copies(self, states: State, sensation: Sensation) -> tuple[State, Array]:
+        """Advances many copies by one control step, each as `step` does one, bit for bit; changes nothing here.
 
         Args:
             states: As `get_state` returns them, the arrays but for the number of steps with one more axis in
                 front, ``n_copies`` long.
             sensation: Lengths with the same axis in front, ``(n_copies, n_segments, n_sensors)``; one time for all.
-            n_steps: Control steps under these lengths, at least 1.
-            each: What differs between the copies; None for this controller's own settings.
 
         Returns:
-            The states that many steps on, and the activation of every step, ``(n_copies, n_steps, n_muscles)``.
+            The states one step on, and the activation, ``(n_copies, n_muscles)``.
         """
-        each = each or self.own
-        per_segment = (each.tolerance_m, each.hysteresis_m, each.sensor_current_nA)
-        tolerance, hysteresis, current = (np.asarray(value)[..., np.newaxis] for value in per_segment)
-        each = CopySettings(tolerance, hysteresis, current, each.kick_nA)
         switches: dict[str, Any] = {"sensor_on": states["sensor_on"].astype(bool), "n_steps": states["n_steps"]}
         n_copies = len(switches["sensor_on"])
         # Few widths of buffers serve any number of copies.
         width = 1 << (n_copies - 1).bit_length()
-        if width not in self._batches:
+        if width not in self._copies:
             own = self._stepper
             stepper = Stepper(own.arrays, own.timestep_ms, own.scheme, width)
-            self._batches[width] = stepper, stepper.initial_state(self._sns.gate_start)
-        stepper, batch = self._batches[width]
-        batch.potential[:n_copies] = states["potential"][:, 0]
-        batch.gate[:n_copies] = states["gate"][:, 0]
-        of_all, potentials = np.zeros((width, self._n_segments + 1)), []
-        for n, inputs_nA in self._inputs(switches, sensation, n_steps, each):
-            of_all[:n_copies] = inputs_nA
-            for _ in range(n):
-                stepper.advance(batch, of_all)
-                potentials.append(batch.potential[:n_copies].copy())
-        potential, gate = batch.potential[:n_copies].copy(), batch.gate[:n_copies].copy()
+            self._copies[width] = stepper, stepper.initial_state(self._sns.gate_start)
+        stepper, copies = self._copies[width]
+        copies.potential[:n_copies] = states["potential"][:, 0]
+        copies.gate[:n_copies] = states["gate"][:, 0]
+        of_all = np.zeros((width, self._n_segments + 1))
+        ((_, of_all[:n_copies]),) = self._inputs(switches, sensation, 1)
+        stepper.advance(copies, of_all)
+        potential, gate = copies.potential[:n_copies].copy(), copies.gate[:n_copies].copy()
         after: State = {"potential": potential[:, np.newaxis], "gate": gate[:, np.newaxis], **switches}
-        return after, self._activation(np.stack(potentials, axis=1))
+        return after, self._activation(potential)
 
     def pieces_copies(self, states: State) -> NDArray[np.bool_]:
         """Finds in which piece of its piecewise smooth equations each of many copies is.

@@ -14,7 +14,7 @@ from annelid.protocols import Array
 
 
 def lengthening_m(stretch_m: Array, rest_stretch_m: Array) -> Array:
-    """Returns by how much each segment's mean length exceeds that at rest, m, the same bits for one worm and for many.
+    """Returns by how much each segment's mean length exceeds that at rest, m, the same bits for one and many copies.
 
     Args:
         stretch_m: Lengths of every segment's springs, m, shape ``(.., n_segments, n_sensors)``.
@@ -59,34 +59,23 @@ class StretchSensor:
         self.on = self.readings(self.on, longer, [time_s])[0]
         return self.on.copy()
 
-    def readings(
-        self,
-        before: NDArray[np.bool_],
-        longer_m: Array,
-        times_s: Sequence[float],
-        tolerance_m: float | Array | None = None,
-        hysteresis_m: float | Array | None = None,
-    ) -> NDArray[np.bool_]:
-        """Returns which sensors are on at some instants, of any number of worms at once.
+    def readings(self, before: NDArray[np.bool_], longer_m: Array, times_s: Sequence[float]) -> NDArray[np.bool_]:
+        """Returns which sensors are on at some instants, of any number of copies at once.
 
         Args:
             before: Which sensors were on at the reading before, ``(.., n_segments)``.
             longer_m: By how much each segment's mean length exceeds that at rest, m, ``(n_times, .., n_segments)``.
             times_s: Simulated times of the readings, s.
-            tolerance_m: Instead of the sensor's own, m: a number, or an array that broadcasts against the result,
-                such as ``(n_worms, 1)`` for one per worm.
-            hysteresis_m: Likewise.
 
         Returns:
             True for every segment that is at most the tolerance (with hysteresis, if it was on) longer than at rest,
             ``(n_times, .., n_segments)``.
         """
-        tolerance = self.settings.tolerance_m if tolerance_m is None else tolerance_m
-        hysteresis = self.settings.hysteresis_m if hysteresis_m is None else hysteresis_m
+        tolerance, hysteresis = self.settings.tolerance_m, self.settings.hysteresis_m
         on: NDArray[np.bool_] = longer_m <= tolerance
         held = sum(map(self.held_at, times_s))
         on[:held, ..., 0] = False
-        if np.any(hysteresis):
+        if hysteresis:
             for number, longer in enumerate(longer_m):
                 on[number] = longer <= tolerance + hysteresis * before
                 if number < held:

@@ -1,4 +1,4 @@
-"""Worms as Gymnasium environments (extra ``gym``), alone or many at once.
+"""Worms as Gymnasium environments (extra ``gym``).
 
 Importing this module registers them, which Gymnasium can do itself (``"annelid.environments:annelid/Worm-v0"``)::
 
@@ -6,7 +6,7 @@ Importing this module registers them, which Gymnasium can do itself (``"annelid.
     import annelid.environments
 
     env = gymnasium.make("annelid/Worm-v0")
-    many = gymnasium.make_vec("annelid/Worm-v0", num_envs=16)
+    many = gymnasium.make_vec("annelid/Worm-v0", num_envs=8, vectorization_mode="async")
 """
 
 from __future__ import annotations
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from annelid.environments.episode import Layout
     from annelid.environments.single import WormEnv
     from annelid.environments.task import Weights
-    from annelid.environments.vector import WormVectorEnv
 
 NAMESPACE = "annelid"
 PIPE_EPISODE_S = 60.0
@@ -30,7 +29,7 @@ ENVIRONMENTS: dict[str, dict[str, Any]] = {
 }
 """Names within the namespace, and what they set beyond the defaults of `WormEnv`."""
 
-__all__ = ["ENVIRONMENTS", "Layout", "Weights", "WormEnv", "WormVectorEnv"]
+__all__ = ["ENVIRONMENTS", "Layout", "Weights", "WormEnv"]
 
 try:
     from gymnasium.envs.registration import register
@@ -38,11 +37,8 @@ except ImportError:
     raise MissingDependency("environments need gymnasium: install it with  pip install 'annelid[gym]'") from None
 
 for _name, _kwargs in ENVIRONMENTS.items():
-    register(
-        f"{NAMESPACE}/{_name}",
-        entry_point="annelid.environments.single:WormEnv",
-        vector_entry_point="annelid.environments.vector:WormVectorEnv",
-        kwargs=_kwargs,
-    )
+    register(f"{NAMESPACE}/{_name}", entry_point="annelid.environments.single:WormEnv", kwargs=_kwargs)
 
-__getattr__, __dir__ = lazy(__name__)
+__getattr__, __dir__ = lazy(
+    __name__, {"WormVectorEnv": "make many worms with gymnasium.make_vec or gymnasium.vector.AsyncVectorEnv"}
+)

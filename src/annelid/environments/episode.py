@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from annelid.arena.course import AHEAD, LEFT, UP
 from annelid.config import ArenaKind
 from annelid.environments.task import Deed, Task, reward_terms
-from annelid.errors import ConfigError
+from annelid.errors import ConfigError, SimulationStopped
 from annelid.morphology import Array, heading_turn
 from annelid.protocols import SIDES, Sensation
 from annelid.simulation.worm import WormPlant, body_and_arena
@@ -155,7 +155,7 @@ class Outcome(NamedTuple):
 
 
 class Episode:
-    """The state of one worm's episode, whoever steps the worm.
+    """The state of one worm's episode.
 
     Attributes:
         stopped: Why the simulation of the worm broke down; empty while it goes on.
@@ -224,22 +224,37 @@ class Episode:
         share = np.arange(1, self.task.moves_per_step + 1)[:, np.newaxis] / self.task.moves_per_step
         return (1.0 - share) * self.activation + share * np.clip(wanted, 0.0, 1.0)
 
-    def observe(self, sensation: Sensation) -> None:
+    def step(self, action: ArrayLike, random: np.random.Generator) -> Outcome:
+        """Moves the worm for a step under an action; ``random`` is the sensors' noise.
+
+        Raises:
+            ConfigError: As `activations`.
+        """
+        for activation in self.activations(action):
+            try:
+                self._observe(self.worm.step(activation))
+            except SimulationStopped as stop:
+                self._stop(str(stop))
+            if self.stopped:
+                break
+        return self._outcome(action, random)
+
+    def _observe(self, sensation: Sensation) -> None:
         """Takes note of a physics step, and of whether the numbers have run away."""
         whole = (sensation.stretch_m, sensation.ring_length_m, sensation.center_of_mass_m, sensation.contact_force_N)
         finite = all(np.isfinite(part).all() for part in whole)
         reason = self.worm.alarm() if finite else "a length, a position or a force became infinite or NaN"
         if reason:
-            self.stop(reason)
+            self._stop(reason)
         else:
             self.sensation = sensation
 
-    def stop(self, reason: str) -> None:
+    def _stop(self, reason: str) -> None:
         """Takes note that the simulation of the worm broke down."""
         self.stopped = f"at {self.sensation.time_s:.6g} s of simulated time: {reason}"
 
-    def outcome(self, action: ArrayLike, random: np.random.Generator) -> Outcome:
-        """Returns what the agent gets at the end of a step, whose action this was; random is the sensors' noise."""
+    def _outcome(self, action: ArrayLike, random: np.random.Generator) -> Outcome:
+        """Returns what the agent gets at the end of a step, whose action this was."""
         task, length_m = self.task, self.worm.geometry.length_m
         self._steps += 1
         broke_down = bool(self.stopped)

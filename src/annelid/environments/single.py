@@ -15,7 +15,7 @@ from annelid.draw.camera import view_angles
 from annelid.draw.scene import PostureScene
 from annelid.environments.episode import Episode, Layout, Observation
 from annelid.environments.task import COARSE, task_of
-from annelid.errors import ConfigError, SimulationStopped, require_at_least, suggest
+from annelid.errors import ConfigError, require_at_least, suggest
 from annelid.protocols import Sensation
 from annelid.simulation.worm import WormPlant
 
@@ -87,7 +87,7 @@ class WormEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._episode = Episode(self.task, self.worm)
         self.layout: Layout = self._episode.layout
         self.observation_space = self.layout.space()
-        self.action_space = action_space(self.worm)
+        self.action_space = Box(0.0, 1.0, (self.worm.n_muscles,), np.float32)
 
     @property
     def sensation(self) -> Sensation:
@@ -109,7 +109,8 @@ class WormEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         Raises:
             ConfigError: There are options.
         """
-        refuse_options(options)
+        for name in options or {}:
+            raise ConfigError(f"reset() has no option {name!r}: fields are changed where the environment is made")
         super().reset(seed=seed)
         return self._episode.reset(self.np_random)
 
@@ -126,15 +127,7 @@ class WormEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         Raises:
             ConfigError: The episode has ended, or the action has another shape or a value out of its range.
         """
-        episode = self._episode
-        for activation in episode.activations(action):
-            try:
-                episode.observe(self.worm.step(activation))
-            except SimulationStopped as stop:
-                episode.stop(str(stop))
-            if episode.stopped:
-                break
-        return episode.outcome(action, self.np_random)
+        return self._episode.step(action, self.np_random)
 
     def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
         """Draws the worm as it is now: pixels, ``(height, width, 3)``; None without a render mode.
@@ -149,19 +142,8 @@ class WormEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._pictures.close()
 
 
-def action_space(worm: WormPlant) -> Box[np.float32]:
-    """Returns the space of actions: an activation for every ring muscle."""
-    return Box(0.0, 1.0, (worm.n_muscles,), np.float32)
-
-
-def refuse_options(options: Mapping[str, Any] | None) -> None:
-    """Raises `ConfigError` for options of a reset, of which there are none."""
-    for name in options or {}:
-        raise ConfigError(f"reset() has no option {name!r}: fields are changed where the environment is made")
-
-
 class Pictures:
-    """Draws worms as they are now, with one scene for each different model."""
+    """Draws a worm as it is now."""
 
     def __init__(self, mode: str | None, camera: str, width: int, height: int) -> None:
         """Keeps how they are to be drawn; `AnnelidError` for what cannot be."""
@@ -170,25 +152,22 @@ class Pictures:
         view_angles(camera)
         require_at_least(1, width=width, height=height)
         self._camera, self._width, self._height = camera, width, height
-        self._scenes: dict[str, PostureScene] = {}
+        self._scenes: list[PostureScene] = []
         # OpenGL cannot be freed any more once Python is shutting down, and environments are often left open.
         weakref.finalize(self, _close, self._scenes)
 
     def draw(self, episode: Episode) -> NDArray[np.uint8]:
         """Draws a worm: pixels, ``(height, width, 3)``."""
-        config = episode.task.config
-        drawn = config.model_dump_json(include={"body", "arena"})
-        if drawn not in self._scenes:
-            self._scenes[drawn] = PostureScene(config, self._width, self._height, self._camera)
+        if not self._scenes:
+            self._scenes.append(PostureScene(episode.task.config, self._width, self._height, self._camera))
         caption = f"{episode.sensation.time_s:.2f} s"
-        return self._scenes[drawn].picture(episode.worm.qpos, episode.activation, caption)
+        return self._scenes[0].picture(episode.worm.qpos, episode.activation, caption)
 
     def close(self) -> None:
         """Frees what was opened."""
         _close(self._scenes)
 
 
-def _close(scenes: dict[str, PostureScene]) -> None:
-    for scene in scenes.values():
-        scene.close()
-    scenes.clear()
+def _close(scenes: list[PostureScene]) -> None:
+    while scenes:
+        scenes.pop().close()

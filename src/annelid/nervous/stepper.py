@@ -1,4 +1,4 @@
-"""The batched stepper: one time step of many copies of a network, in a few numpy calls."""
+"""The stepper: one time step of many copies of a network, in a few numpy calls."""
 
 from __future__ import annotations
 

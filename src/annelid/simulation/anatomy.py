@@ -1,8 +1,4 @@
-"""Where the parts of a worm are in the engine's arrays, and what they say of its lengths and forces.
-
-Every function takes the arrays of one worm, or those of many with one more axis in front, and gives the same numbers
-to the last bit in both cases: sums run in the same order whatever the number of worms.
-"""
+"""Where the parts of a worm are in the engine's arrays, and what they say of its lengths and forces."""
 
 from __future__ import annotations
 
@@ -35,8 +31,8 @@ _NET_FORCE = 3
 def add_contact_sensors(spec: mujoco.MjSpec, arena: ArenaKind) -> None:
     """Adds, for every geom of the skin and every geom of the arena that it can touch, a sensor of the net force on it.
 
-    They are in the world's axes, change nothing in the motion, and read the same in a batch as alone. In a scene there
-    is one for every geom of the skin, whatever it touches.
+    They are in the world's axes and change nothing in the motion. In a scene there is one for every geom of the skin,
+    whatever it touches.
     """
     if arena.is_scene:
         add_scene_sensors(spec, arena.object_names)
@@ -58,7 +54,7 @@ def add_contact_sensors(spec: mujoco.MjSpec, arena: ArenaKind) -> None:
 
 
 class Posture(NamedTuple):
-    """Positions and lengths at one instant, m; of many worms with one more axis in front."""
+    """Positions and lengths at one instant, m."""
 
     crossing: Array  # positions of the crossings, (n_crossings, 3)
     center_of_mass: Array  # (3,)
@@ -73,20 +69,12 @@ class Posture(NamedTuple):
 
 
 class Forces(NamedTuple):
-    """What acted during the last physics step; of many worms with one more axis in front."""
+    """What acted during the last physics step."""
 
     contact: Array  # force of the arena on every segment, N, (n_segments, 3)
     edge_strain: Array  # largest strain of a rod's edge, (); 0 for a chain
     pin_gap: Array  # largest gap between two pinned strands, m, (); 0 where pins cannot part
     met: Met  # what was met in a scene
-
-
-class Movement(NamedTuple):
-    """What one movement of a body has come to: its posture then, and what acted during its last physics step."""
-
-    posture: Posture
-    forces: Forces
-    ground: Array  # force of the ground on every geom of the skin, N, (n_geoms, 3)
 
 
 class Anatomy:
@@ -211,10 +199,9 @@ class Anatomy:
 
         The muscles' pull is read by the energy meter. Of the engine's arrays those named in `outputs` are needed.
         """
-        by_geom = engine["sensordata"][..., self._contact_slice]
-        by_geom = by_geom.reshape(*by_geom.shape[:-1], -1, 3)
+        by_geom = engine["sensordata"][self._contact_slice].reshape(-1, 3)
         contact = self._segment_rows @ by_geom
-        strain = gap = np.zeros(contact.shape[:-2])
+        strain = gap = np.zeros(())
         if self._vertices is not None:
             strain = self._edge_strain(self._vertices, engine["qpos"])
         if self._pin_gap is not None:
@@ -258,7 +245,7 @@ def turned(model: mujoco.MjModel, turn: Array, lifted_m: float = 0.0, posture: A
 
     The model lies along x, and its state at the start is that of the turned worm. So all that belongs to the body
     (which segment and side a part of the skin is on, the grain of setae, rest lengths) is the same for all headings,
-    and worms of several headings may share one compiled model.
+    and one compiled model serves all of them.
     """
     qpos: Array = (model.qpos0 if posture is None else posture).copy()
     # Points on three slides along the world's axes.

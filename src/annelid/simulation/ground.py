@@ -14,7 +14,7 @@ class MovingGround:
 
     What approaches the ground finds its plane nearer by as much as it has yet to come in the step: the engine acts on
     where the skin is, and would stop it a step too late. Planes and friction follow from the engine's positions and
-    velocities alone, so a run continues and a batch computes to the same bits.
+    velocities alone, so a run continues to the same bits.
 
     Attributes:
         depth_m: Depth of the deepest part of the skin in the ground where planes were laid last, m; negative above it.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from time import perf_counter
@@ -79,25 +79,19 @@ def simulate(
         reporting(progress, simulation.schedule.start * simulation.schedule.timestep_s, config.duration_s) as report,
         Interruption() as interruption,
     ):
-        Loop([run]).run(interruption, report)
-    if run.error is not None:
-        raise run.error
+        run.run(interruption, report)
     return open_run(out / FILE_NAME)
 
 
 class RecordedRun:
-    """A worm with its controller and its run file, which says how the run ended, however it ends.
+    """A worm with its controller and its run file, which says how the run ended, however it ends."""
 
-    Its status is one of `annelid.simulation.runfile.STATUSES`, its message says why it ended before its time, and its
-    error is what ended it.
-    """
+    flush_interval_s = 0.5
+    checkpoint_interval_s = 1.0
 
     def __init__(self, config: RunConfig, simulation: Simulation, path: Path, origin: Origin | None = None) -> None:
         """Lays out the run file of a simulation that is about to begin, or to continue another run."""
         self.simulation = simulation
-        self.status = "running_or_killed"
-        self.message = ""
-        self.error: BaseException | None = None
         plant, controller = simulation.plant, simulation.controller
         sources = [plant if isinstance(plant, Records) else Senses(lambda: simulation.sensation)]
         sources += [controller] if isinstance(controller, Records) else []
@@ -110,6 +104,36 @@ class RecordedRun:
         attrs |= global_attributes(config, parts) | ({} if origin is None else origin.attrs())
         rest_stretch_m = simulation.sensation.rest_stretch_m
         self.recorder = Recorder(path, simulation.schedule, parts, rest_stretch_m, packed, attrs)
+
+    def run(self, interruption: Interruption, report: ProgressCallback | None = None) -> None:
+        """Runs to the end, unless interrupted; the file says what error ended it, which is raised."""
+        simulation, schedule = self.simulation, self.simulation.schedule
+        began = now = perf_counter()
+        flush_due, checkpoint_due = began + self.flush_interval_s, began + self.checkpoint_interval_s
+        report_due = began
+        try:
+            if schedule.start == 0:
+                self.record(0.0)
+            while simulation.step < schedule.end and interruption.requested is None:
+                simulation.advance()
+                now = perf_counter()
+                self.record(now - began)
+                if now >= flush_due:
+                    self.recorder.flush()
+                    flush_due = now + self.flush_interval_s
+                if now >= checkpoint_due:
+                    self.checkpoint()
+                    cost_s = perf_counter() - now
+                    checkpoint_due = now + max(self.checkpoint_interval_s, cost_s / _CHECKPOINT_SHARE)
+                if report is not None and now >= report_due:
+                    report(simulation.step * schedule.timestep_s, now - began)
+                    report_due = now + PROGRESS_INTERVAL_S
+            self.finish(interruption.requested if simulation.step < schedule.end else None)
+            if report is not None:
+                report(simulation.step * schedule.timestep_s, now - began)
+        except BaseException as error:
+            self.end_with(error)
+            raise
 
     def record(self, wall_time_s: float) -> None:
         """Records a sample and a frame, where one is due."""
@@ -132,107 +156,28 @@ class RecordedRun:
         self._stop()
         self.checkpoint()
         if interrupted_by is None:
-            self._end("complete")
+            self.recorder.finish("complete")
         else:
-            self._end("interrupted", self.simulation.at(f"{interrupted_by} ended the run"))
+            self.recorder.finish("interrupted", self.simulation.at(f"{interrupted_by} ended the run"))
 
     def end_with(self, error: BaseException) -> None:
         """Ends the run because of an error; a file that is closed stays as it is."""
-        self.error = self.error or error
         self._stop()
         if self.recorder.closed:
             return
         with suppress(RunFileError):
             if isinstance(error, SimulationStopped):
                 self.recorder.warn(self.simulation.doubts())
-                self._end("stopped_by_guard", str(error))
+                self.recorder.finish("stopped_by_guard", str(error))
             elif isinstance(error, RunFileError):
-                self._end("disk_failure", str(error), whole=False)
+                self.recorder.finish("disk_failure", str(error), whole=False)
             elif isinstance(error, KeyboardInterrupt):
                 # A second one asks to leave now; it may also have come in the middle of a write.
-                self._end("interrupted", self.simulation.at("interrupted"), whole=False)
+                self.recorder.finish("interrupted", self.simulation.at("interrupted"), whole=False)
             else:
-                self._end("failed", self.simulation.at(f"{type(error).__name__}: {error}"))
+                self.recorder.finish("failed", self.simulation.at(f"{type(error).__name__}: {error}"))
 
     def _stop(self) -> None:
         for part in (self.simulation.plant, self.simulation.controller):
             if isinstance(part, Stoppable):
                 part.stop()
-
-    def _end(self, status: str, message: str = "", whole: bool = True) -> None:
-        self.status, self.message = status, message
-        self.recorder.finish(status, message, whole=whole)
-
-
-class Loop:
-    """The loop of a run, or of runs that go on together in one thread; those that have not ended are ``going``."""
-
-    flush_interval_s = 0.5
-    checkpoint_interval_s = 1.0
-
-    def __init__(self, runs: Sequence[RecordedRun]) -> None:
-        """Takes runs that are at the same step, of the same schedule."""
-        self.runs = runs
-        self.going = dict(enumerate(runs))
-        self._schedule = runs[0].simulation.schedule
-
-    @property
-    def simulated_s(self) -> float:
-        """How far it has come, s; where all runs have ended it has come to the end."""
-        return self._step() * self._schedule.timestep_s
-
-    def run(self, interruption: Interruption, report: ProgressCallback | None = None) -> None:
-        """Runs to the end, unless interrupted; a run that fails ends with that error, and the others go on."""
-        began = now = perf_counter()
-        due = {"flush": began + self.flush_interval_s, "checkpoint": began + self.checkpoint_interval_s}
-        due["report"] = began
-        try:
-            if self._schedule.start == 0:
-                self.each(lambda _, run: run.record(0.0))
-            while (step := self._step()) < self._schedule.end and interruption.requested is None:
-                self.advance(step)
-                now = perf_counter()
-                wall_time_s = now - began
-                self.each(lambda _, run, wall_time_s=wall_time_s: run.record(wall_time_s))
-                if now >= due["flush"]:
-                    self.each(lambda _, run: run.recorder.flush())
-                    due["flush"] = now + self.flush_interval_s
-                if now >= due["checkpoint"]:
-                    self.settle()
-                    self.each(lambda _, run: run.checkpoint())
-                    cost_s = perf_counter() - now
-                    due["checkpoint"] = now + max(self.checkpoint_interval_s, cost_s / _CHECKPOINT_SHARE)
-                if report is not None and now >= due["report"]:
-                    report(self.simulated_s, now - began)
-                    due["report"] = now + PROGRESS_INTERVAL_S
-            self.settle()
-            by = interruption.requested if self._step() < self._schedule.end else None
-            self.each(lambda _, run: run.finish(by))
-            if report is not None:
-                report(self.simulated_s, now - began)
-        except BaseException as error:
-            for run in self.going.values():
-                run.end_with(error)
-            raise
-
-    def advance(self, step: int) -> None:
-        """Takes control steps up to the next event, from ``step`` on."""
-        self.each(lambda _, run: run.simulation.advance())
-
-    def settle(self) -> None:
-        """Brings all controllers up to the step that was reached, where something of them is read."""
-
-    def each(self, action: Callable[[int, RecordedRun], object]) -> None:
-        """Does something with every run that is going on and its number; one that fails ends, and the others go on."""
-        for number, run in tuple(self.going.items()):
-            try:
-                action(number, run)
-            except Exception as error:
-                self.drop(number, error)
-
-    def drop(self, number: int, error: Exception) -> None:
-        """Ends one run because of an error."""
-        self.going.pop(number).end_with(error)
-
-    def _step(self) -> int:
-        return next((run.simulation.step for run in self.going.values()), self._schedule.end)

@@ -27,7 +27,7 @@ _FORCE, _PLACE = (
 
 
 class Met(NamedTuple):
-    """What a worm met in a scene during the last physics step; of many worms with one more axis in front."""
+    """What a worm met in a scene during the last physics step."""
 
     force: Array  # of the worm on every body that moves, N, (n_objects, 3)
     depth: Array  # of the deepest vertex, m, (); negative above the ground
@@ -97,15 +97,13 @@ class Objects:
         return -float((self._weight_N * places_m).sum())
 
     def met(self, engine: Mapping[str, Array]) -> Met:
-        """Reads the sensors from the engine's arrays, of one worm or of many."""
-        values = engine["sensordata"]
-        many = values.shape[:-1]
+        """Reads the sensors from the engine's arrays."""
         if not self._is_scene:
-            return Met(*(np.broadcast_to(part, (*many, *part.shape)) for part in NOTHING)) if many else NOTHING
-        first, last = self._first, self._first + 4 * self.n_skin
-        deepest = values[..., first:last].reshape(*many, -1, 4)
-        forces = values[..., last : last + 3 * self.n_skin * len(self.names)]
-        force = forces.reshape(*many, len(self.names), self.n_skin, 3).sum(axis=-2)
+            return NOTHING
+        values, first, last = engine["sensordata"], self._first, self._first + 4 * self.n_skin
+        deepest = values[first:last].reshape(-1, 4)
+        forces = values[last : last + 3 * self.n_skin * len(self.names)]
+        force = forces.reshape(len(self.names), self.n_skin, 3).sum(axis=-2)
         # Without a contact all numbers are 0: then the skin's surface is at the ground at most.
-        depth = -deepest[..., 0].min(axis=-1) - self._radius_m
-        return Met(force, depth, deepest[..., 1:].copy())
+        depth = -deepest[:, 0].min() - self._radius_m
+        return Met(force, depth, deepest[:, 1:].copy())

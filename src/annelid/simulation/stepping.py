@@ -95,7 +95,6 @@ class Simulation:
         sensation: The plant's latest sensation, without noise.
         activation: The latest activation.
         noise: Generator of the sensor noise.
-        is_noisy: Whether noise is drawn at every control step.
     """
 
     def __init__(
@@ -112,7 +111,6 @@ class Simulation:
         self.step, self.sensation = step, sensation
         self.activation: Array = np.zeros(plant.n_muscles)
         self.noise, self._noise_m = noise, config.sensor.noise_m
-        self.is_noisy = self._noise_m > 0
         # A quantity that a body does not have is NaN from the start and means nothing later.
         has = [name for name in _OPTIONAL_FIELDS if np.isfinite(getattr(sensation, name)).all()]
         self._watched = ["stretch_m", *has]
@@ -120,7 +118,8 @@ class Simulation:
         ratio = StepRatio(config.clock.control_timestep_s, config.clock.physics_timestep_s)
         self._watch_every = ratio.control_steps_per_move
         self._striders = None
-        if not self.is_noisy and isinstance(plant, MultiRatePlant) and isinstance(controller, StridingController):
+        # Noise is drawn at every control step.
+        if not self._noise_m and isinstance(plant, MultiRatePlant) and isinstance(controller, StridingController):
             self._striders = plant, controller
         self._alarms = [part.alarm for part in (plant, controller) if isinstance(part, Watched)]
 
@@ -128,34 +127,30 @@ class Simulation:
         """Takes one control step, or all up to the next movement, sample or frame where plant and controller can.
 
         Raises:
-            SimulationStopped: As `advanced`, or the activation is out of range.
+            SimulationStopped: The activation is out of range, the body has moved and its numbers have run away, or
+                plant or controller is alarmed.
         """
         if self._striders is None:
             n_steps = 1
             activation = np.asarray(self.controller.step(self.observed()), dtype=np.float64)[np.newaxis]
-            self.check_activation(activation)
+            self._check(activation)
             self.sensation = self.plant.step(activation[0])
         else:
             plant, controller = self._striders
             n_steps = min(plant.steps_to_move(), self.schedule.steps_to_record(self.step))
             activation = np.asarray(controller.stride(self.sensation, n_steps), dtype=np.float64)
-            self.check_activation(activation)
+            self._check(activation)
             self.sensation = plant.stride(activation)
-        step = self.step + n_steps
-        self.advanced(self.sensation, activation[-1], step, step % self._watch_every < n_steps)
+        self.activation = activation[-1]
+        self.step += n_steps
+        if self.step % self._watch_every < n_steps:
+            self._watch()
 
-    def advanced(self, sensation: Sensation, activation: Array, step: int, moved: bool) -> None:
-        """Takes note of control steps up to a number since time zero, whoever has taken them.
-
-        Raises:
-            SimulationStopped: The body has moved and its numbers have run away, or plant or controller is alarmed.
-        """
-        self.sensation, self.activation, self.step = sensation, activation, step
-        if not moved:
-            return
+    def _watch(self) -> None:
+        """Stops a body whose numbers have run away, or an alarmed plant or controller."""
         total = 0.0
         for name in self._watched:
-            total += np.add.reduce(getattr(sensation, name), axis=None)
+            total += np.add.reduce(getattr(self.sensation, name), axis=None)
         if not math.isfinite(total):
             self._explain_runaway()
         for alarm in self._alarms:
@@ -176,7 +171,7 @@ class Simulation:
         noise = self.noise.normal(0.0, self._noise_m, true.stretch_m.shape)
         return replace(true, stretch_m=true.stretch_m + noise)
 
-    def check_activation(self, activation: Array) -> None:
+    def _check(self, activation: Array) -> None:
         """Stops a controller that breaks its promise before its numbers reach the engine.
 
         Given is the activation of some steps, ``(n_steps, n_muscles)``.

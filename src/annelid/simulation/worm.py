@@ -22,7 +22,7 @@ from annelid.errors import SimulationStopped
 from annelid.morphology import Array, heading_turn
 from annelid.plausibility import check, refuse_nonsense
 from annelid.protocols import SIDES, Recordable, Sensation, Signal, State, Values
-from annelid.simulation.anatomy import Anatomy, Forces, Movement, Posture, add_contact_sensors, laid_down
+from annelid.simulation.anatomy import Anatomy, Forces, Posture, add_contact_sensors, laid_down
 from annelid.simulation.energies import EnergyTotals, Powers, done_in
 from annelid.simulation.ground import MovingGround
 from annelid.simulation.objects import NOTHING
@@ -112,12 +112,6 @@ def compile_worm(config: RunConfig) -> Anatomy:
     return Anatomy(compile_spec(spec), body, arena)
 
 
-def owns_model(config: RunConfig) -> bool:
-    """Whether a worm sets numbers in its compiled model as it moves, which no other worm may use then."""
-    body, arena = body_and_arena(config)
-    return arena.has_setae or body.formulation.has_rods
-
-
 class WormPlant:
     """The 3D worm in its arena: what it senses, records and is alarmed by, with an engine of its own.
 
@@ -126,7 +120,7 @@ class WormPlant:
     step.
 
     Attributes:
-        anatomy: The compiled body; the worm's own where `owns_model` says so.
+        anatomy: The compiled body, of this worm alone: some worms set numbers in the model as they move.
         model: The compiled body in the engine.
         data: The engine's data.
         geometry: The mesh.
@@ -206,19 +200,19 @@ class WormPlant:
         own = -self.total_mass_kg * float(self.model.opt.gravity @ self.posture.center_of_mass)
         return own + self.anatomy.objects.potential_energy_J(self.posture.objects)
 
-    def move(self, activation: Array, n_steps: int) -> Movement:
+    def move(self, activation: Array, n_steps: int) -> None:
         """Takes physics steps under an activation, ``(n_muscles,)``; `SimulationStopped` where the engine gives up."""
-        return self._move(activation, n_steps, acts=True)
+        self._move(activation, n_steps, acts=True)
 
     def _act(self, commands: Array, time_s: float) -> None:
         """Lets the actuators follow commands, ``(n_commands, n_muscles)``, each for a time, s."""
         lengths = self.posture.ring_length
         self.act[:] = self.anatomy.rings.states_after(self.model, commands, self.act, lengths, time_s)
 
-    def _move(self, activation: Array, n_steps: int, *, acts: bool) -> Movement:
+    def _move(self, activation: Array, n_steps: int, *, acts: bool) -> None:
         """As `move`, with actuators that have followed their commands unless they are to do it now."""
         trial, rings = self._config.trial, self.anatomy.rings
-        self._skin_before = self.posture.skin
+        skin_before = self.posture.skin
         self._activation = activation
         if trial is not None and trial.push_N:
             pushed = trial.push_from_s <= self._time_s < trial.push_from_s + trial.push_s
@@ -232,8 +226,11 @@ class WormPlant:
                 self._take_step(self.act.copy() if self.model.na else activation)
         except mujoco.FatalError as error:
             raise SimulationStopped(f"the engine stopped at {self.data.time:.3f} s: {error}") from None
-        forces, ground = self.anatomy.forces(self.engine)
-        return Movement(self.posture, forces, ground)
+        self._forces, ground_N = self.anatomy.forces(self.engine)
+        self._rate = None
+        normals = self._forces.met.normal if self._is_scene else None
+        skin, axis, time_s = self.posture.skin, self.posture.axis, n_steps * self._step_s
+        self.touch = self.anatomy.skin.touch(self.touch, ground_N, skin_before, skin, axis, time_s, normals)
 
     def _take_step(self, drive: Array) -> None:
         """Takes one physics step, with what the actuators' gain is multiplied by, and adds it to the energy totals."""
@@ -307,26 +304,12 @@ class WormPlant:
 
         Given is the activation of every step, ``(n_steps, n_muscles)``.
         """
-        n_steps = len(activation)
-        due = self.moves_due(n_steps)
+        after = self._control_step + len(activation)
         if self._acts_by_command:
             self._act(activation, self._config.clock.control_timestep_s)
-        return self.after(n_steps, self._move(activation[-1], due, acts=not self._acts_by_command) if due else None)
-
-    def moves_due(self, n_steps: int) -> int:
-        """Number of physics steps at the end of the next ``n_steps`` control steps, at most `steps_to_move` of them."""
-        return self._ratio.physics_steps_due(self._control_step + n_steps)
-
-    def after(self, n_steps: int, moved: Movement | None) -> Sensation:
-        """Takes note of control steps, and of what a movement of the body has come to, if any; then observes."""
-        time_s = self.moves_due(n_steps) * self._config.clock.physics_timestep_s
-        self._control_step += n_steps
-        if moved is not None:
-            self.posture, self._forces, ground = moved
-            self._rate = None
-            normals = self._forces.met.normal if self._is_scene else None
-            skin, axis = self.posture.skin, self.posture.axis
-            self.touch = self.anatomy.skin.touch(self.touch, ground, self._skin_before, skin, axis, time_s, normals)
+        if due := self._ratio.physics_steps_due(after):
+            self._move(activation[-1], due, acts=not self._acts_by_command)
+        self._control_step = after
         return self.observe()
 
     def observe(self) -> Sensation:

@@ -82,7 +82,7 @@ class BatchedController(Protocol):
     """The capability of a controller of advancing many copies at once; states are as for `BatchedPlant`."""
 
     def step_copies(self, states: State, sensation: Sensation) -> tuple[State, Array]:
-        """Returns their states one control step on, and its activation, ``(n_copies, 1, n_muscles)``."""
+        """Returns their states one control step on, and its activation, ``(n_copies, n_muscles)``."""
         ...
 
 
@@ -197,7 +197,7 @@ class ClosedLoop:
         of_plant, of_controller = (part | rest for part, rest in zip(parts, self._rest, strict=True))
         for _ in range(self._stride):
             of_controller, activation = controller.step_copies(of_controller, plant.sense_copies(of_plant))
-            of_plant = plant.step_copies(of_plant, activation[:, 0])
+            of_plant = plant.step_copies(of_plant, activation)
         return [of_plant, of_controller]
 
     def _step_each(self, parts: list[State], n_copies: int) -> list[State]:

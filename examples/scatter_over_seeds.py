@@ -1,8 +1,8 @@
 """How much does noise scatter a rhythm? Eight worms with the same noise on their sensors, each from another seed.
 
-    python examples/batch_over_seeds.py [noise in mm]
+    python examples/scatter_over_seeds.py [noise in mm]
 
-All worms run as one batch, each bit for bit as if alone. Takes half a minute on two cores.
+The worms run in processes, one for every core.
 """
 
 from __future__ import annotations
@@ -14,19 +14,20 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from annelid import load_config, simulate_batch, summary
-from annelid.analysis import rhythm_score
+from annelid.experiment import Case, Store
 
 
 def main(folder: Path, noise_m: float = 0.025, duration_s: float = 8.0, seeds: Sequence[int] = range(8)) -> None:
-    """Runs the batch, scores every worm, and tells the scatter of their periods."""
-    config = load_config("riddle2023-rods", {"sensor.noise_m": noise_m, "duration_s": duration_s})
-    batch = simulate_batch(config, folder, seeds=seeds)
+    """Runs the worms, and tells the verdict on every rhythm and the scatter of their periods."""
+    changes = {"sensor.noise_m": noise_m, "duration_s": duration_s}
+    cases = [Case("riddle2023-rods", {**changes, "seed": seed}) for seed in seeds]
+    store = Store(folder)
+    store.compute(cases)
     periods_s = []
-    for seed, run in zip(seeds, batch, strict=True):
-        score = rhythm_score(run)
+    for seed, case in zip(seeds, cases, strict=True):
+        score = store[case].rhythm
         print(f"seed {seed}: {score.verdict or 'too short'}, {score.reason}")
-        period_s = summary(run).period_s
+        period_s = store[case].summary.period_s
         if period_s is not None:
             periods_s.append(period_s)
     if periods_s:

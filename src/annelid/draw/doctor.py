@@ -36,7 +36,7 @@ class Finding:
     ok: bool  # whether it is there and works
     detail: str = ""  # its version, or what is wrong
     remedy: str = ""  # what to type where it is missing
-    optional: bool = False  # whether annelid list runs without it
+    optional: bool = False  # whether annelid runs without it
 
     @property
     def state(self) -> str:

@@ -61,8 +61,11 @@ def moved(package: str, now: str) -> Callable[[str], Any]:
 
     def get(name: str) -> Any:
         import warnings
+        from importlib.util import find_spec
 
-        found = None if name.startswith("_") else getattr(import_module(now), name, None)
+        # Python asks here, too, before it imports a module of the package itself.
+        is_own = name.startswith("_") or find_spec(f"{package}.{name}") is not None
+        found = None if is_own else getattr(import_module(now), name, None)
         if found is None:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
         warnings.warn(f"{package}.{name} is now {now}.{name}", DeprecationWarning, stacklevel=2)

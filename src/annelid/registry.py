@@ -58,6 +58,10 @@ class Registry(Generic[Item]):
         self._known[name] = item
         return item
 
+    def has(self, name: str) -> bool:
+        """Returns whether a thing is registered so far, and imports nothing for it."""
+        return name in self._known
+
     def all(self) -> dict[str, Item]:
         """Returns everything that is registered, in the order of the names."""
         for home in self._homes:

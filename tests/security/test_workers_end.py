@@ -178,7 +178,6 @@ def test_every_command_with_workers_is_among_those_killed() -> None:
     from annelid.cli import app
 
     top: Any = get_command(app)
-    experiments = top.commands["experiment"].commands
-    named = {name: command for name, command in (top.commands | experiments).items() if name != "experiment"}
+    named = {**top.commands, **top.commands["study"].commands}
     with_jobs = {name for name, command in named.items() if any(one.name == "jobs" for one in command.params)}
     assert {"uncertainty" if name == "run" else name for name in with_jobs} == set(COMMANDS) - {"bench"}

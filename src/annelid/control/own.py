@@ -69,7 +69,8 @@ def own_controller(name: str) -> str:
         kind: str = found.model_fields["kind"].default
     elif callable(found) and (not isinstance(found, type) or (hasattr(found, "reset") and hasattr(found, "step"))):
         kind = name
-        if kind not in ControllerKind.registry.all():
+        # In a worker this runs while the package of controllers is imported.
+        if not ControllerKind.registry.has(kind):
             fields: dict[str, Any] = {"kind": (Literal[name], name)}
             own = create_model(found.__name__, __base__=OwnController, __module__=module_name, **fields)
             own.made = staticmethod(found)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import webbrowser
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -321,6 +320,8 @@ def play(
         open_browser: Whether to open the page.
         plots: Further plots beside the worm, by their names.
     """
+    import webbrowser
+
     from annelid.live.server import free_port, warning_of
     from annelid.live.show import Show
 

@@ -26,7 +26,7 @@ def activation(numbers: np.ndarray, time_s: float, stretch: np.ndarray) -> np.nd
     return 1.0 / (1.0 + np.exp(-4.0 * np.exp(0.5 * steepness) * drive))
 
 
-def returns(envs: gymnasium.vector.VectorEnv, numbers: np.ndarray) -> np.ndarray:
+def returns(envs: gymnasium.vector.SyncVectorEnv | gymnasium.vector.AsyncVectorEnv, numbers: np.ndarray) -> np.ndarray:
     """Sum of rewards of one episode of every worm, each with five numbers of its own, (worms, 5)."""
     layout = envs.get_attr("layout")[0]
     (observations, _), total, going, time_s = envs.reset(seed=0), 0.0, True, 0.0

@@ -8,7 +8,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
-from gymnasium.vector import AsyncVectorEnv
+from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
 from worms import CHEAP, same
 
 import annelid.environments
@@ -31,24 +31,24 @@ def test_a_worm_in_a_process_of_its_own_is_bit_for_bit_the_one_that_moves_alone(
         actions = random.random((3, 3)).astype(np.float32)
         observations, rewards, over, late, infos = envs.step(actions)
         for row, env in enumerate(alone):
-            # Gymnasium begins an episode anew in the step after its last one.
-            expected = (*env.reset(), 0.0, False, False) if ended[row] else env.step(actions[row])
             if ended[row]:
-                assert same(observations[row], expected[0])
-            else:
-                told = (observations[row], float(rewards[row]), bool(over[row]), bool(late[row]))
-                assert same(told, expected[:4])
-                assert same({name: values[row] for name, values in infos.items() if name in expected[4]}, expected[4])
-                breakdowns += expected[2]
+                # Gymnasium begins an episode anew in the step after its last one.
+                assert same(observations[row], env.reset()[0])
+                continue
+            *expected, info = env.step(actions[row])
+            assert same([observations[row], float(rewards[row]), bool(over[row]), bool(late[row])], expected)
+            assert same({name: values[row] for name, values in infos.items() if name in info}, info)
+            breakdowns += over[row]
         ended = (over | late).tolist()
     envs.close()
     assert breakdowns
     assert not same(observations[0], observations[2])
 
 
-@pytest.mark.parametrize("mode", ["sync", "async"])
-def test_gymnasium_makes_many_by_name(mode: str) -> None:
+@pytest.mark.parametrize(("mode", "made"), [("sync", SyncVectorEnv), ("async", AsyncVectorEnv)])
+def test_gymnasium_makes_many_by_name(mode: str, made: type[SyncVectorEnv] | type[AsyncVectorEnv]) -> None:
     envs = gymnasium.make_vec("annelid/Worm-v0", num_envs=2, vectorization_mode=mode, **CHEAP)
+    assert isinstance(envs, made)
     observations, _ = envs.reset(seed=0)
     assert observations.shape == envs.observation_space.shape
     layout, *_ = envs.get_attr("layout")

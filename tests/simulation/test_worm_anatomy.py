@@ -2,33 +2,20 @@
 
 from __future__ import annotations
 
-from functools import cache
-from typing import Any
-
 import mujoco
 import numpy as np
 import pytest
 
 from annelid.body import build_spec, compile_spec
 from annelid.config import load_config
-from annelid.simulation.anatomy import Anatomy
 from annelid.simulation.worm import WormPlant, compile_worm
 
-BODIES: dict[str, dict[str, Any]] = {
-    "rods": {},
-    "rods with separate pins": {"body.formulation.pins": "separate"},
-    "chain": {"body.formulation.kind": "chain"},
-}
 SMALL = {"body.mesh.elements_per_side": 2, "body.mesh.n_helices": 8}
 
 
-@cache
-def anatomy(body: str) -> Anatomy:
-    return compile_worm(load_config("riddle2023-rods", SMALL | BODIES[body]))
-
-
 def test_lengths_are_the_distances_along_springs_and_rings() -> None:
-    part, crossing = anatomy("rods"), np.random.default_rng(1).normal(size=(anatomy("rods").geometry.n_crossings, 3))
+    part = compile_worm(load_config("riddle2023-rods", SMALL))
+    crossing = np.random.default_rng(1).normal(size=(part.geometry.n_crossings, 3))
     posture = part.posture(crossing, np.zeros(3), np.zeros((0, 3)), np.zeros((0, 3)))
     first, second = crossing[part.geometry.springs].transpose(1, 0, 2)
     assert posture.spring_length == pytest.approx(np.linalg.norm(second - first, axis=1))

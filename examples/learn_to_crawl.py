@@ -15,7 +15,7 @@ from rich.progress import track
 
 from annelid.draw.canvas import canvas, save
 
-START, WORMS = np.zeros(5), 8
+NAME, START, WORMS = "annelid.environments:annelid/Worm-v0", np.zeros(5), 8
 
 
 def activation(numbers: np.ndarray, time_s: float, stretch: np.ndarray) -> np.ndarray:
@@ -28,8 +28,7 @@ def activation(numbers: np.ndarray, time_s: float, stretch: np.ndarray) -> np.nd
 
 def returns(envs: gymnasium.vector.SyncVectorEnv | gymnasium.vector.AsyncVectorEnv, numbers: np.ndarray) -> np.ndarray:
     """Sum of rewards of one episode of every worm, each with five numbers of its own, (worms, 5)."""
-    layout = envs.get_attr("layout")[0]
-    (observations, _), total, going, time_s = envs.reset(seed=0), 0.0, True, 0.0
+    layout, (observations, _), total, going, time_s = envs.get_attr("layout")[0], envs.reset(seed=0), 0.0, True, 0.0
     while np.any(going):
         stretch = layout.named(observations)["stretch_strain"].mean(axis=-1)
         observations, rewards, over, late, infos = envs.step(activation(numbers, time_s, stretch))
@@ -39,8 +38,7 @@ def returns(envs: gymnasium.vector.SyncVectorEnv | gymnasium.vector.AsyncVectorE
 
 def main(folder: Path, generations: int = 25, **worm: object) -> tuple[float, float]:
     """Learns, prints and draws; returns what eight worms got on average at the start and in the end."""
-    name, options = "annelid.environments:annelid/Worm-v0", {"episode_s": 6.0, **worm}
-    envs = gymnasium.make_vec(name, num_envs=WORMS, vectorization_mode="async", **options)
+    envs = gymnasium.make_vec(NAME, WORMS, vectorization_mode="async", **{"episode_s": 6.0, **worm})
     search = CMA(mean=START, sigma=0.5, population_size=WORMS, seed=1)
     curve = [returns(envs, np.tile(START, (WORMS, 1)))]
     for _ in track(range(generations), description="generations"):
@@ -48,7 +46,6 @@ def main(folder: Path, generations: int = 25, **worm: object) -> tuple[float, fl
         curve.append(returns(envs, asked))
         search.tell(list(zip(asked, -curve[-1], strict=True)))
     start, learned = curve[0].mean(), returns(envs, np.tile(search.mean, (WORMS, 1))).mean()
-    envs.close()
     print(f"return of the start {start:.2f}, learned {learned:.2f}, with {np.round(search.mean, 3).tolist()}")
     with canvas(3.0) as figure:
         axes = figure.subplots(subplot_kw={"xlabel": "generation", "ylabel": "return"})

@@ -12,8 +12,6 @@ from small_robot import assert_equal, small_config
 from annelid import load_config, open_run, simulate
 from annelid.analysis import ROBOT_ELONGATION_M, summary
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
-
 
 def test_a_continued_run_is_the_whole_run_bit_for_bit(tmp_path: Path) -> None:
     whole = simulate(small_config(), tmp_path / "whole", progress=False)

@@ -143,7 +143,7 @@ def test_the_window_and_the_thinning_hold_for_any_choice(planar_run: Run, every:
         (Selection(["ring_lenght"]), "did you mean 'ring_length'"),
         (Selection(["time"]), "no signal 'time'"),
         (Selection(every=0), "every = 0"),
-        (Selection(start_s=7.0), "no sample from 7 s: it goes from 0 to 1 s"),
+        (Selection(start_s=7.0), "no sample from 7 s: it goes from 0 to 3 s"),
         (Selection(start_s=0.5, stop_s=0.4), "no sample from 0.5 s to 0.4 s"),
     ],
 )

@@ -49,8 +49,8 @@ def test_results_are_kept_unless_forced(annelid: Command) -> None:
         assert Path(folder, file).read_text() == "mine"
 
 
-def test_an_unknown_figure_is_refused_with_the_nearest(annelid: Command) -> None:
-    done = annelid("draw", "nowhere", "--figure", "trak")
+def test_an_unknown_figure_is_refused_with_the_nearest(annelid: Command, finished: Path) -> None:
+    done = annelid("draw", finished, "--figure", "trak")
     assert done.exit_code == 2
     assert "unknown figure 'trak': did you mean 'track'?" in done.sentence()
 

@@ -95,7 +95,6 @@ def test_a_limit_is_the_users() -> None:
         ({"ring_length_m": np.array([0.96, 0.96, 0.15])}, "ring 3 was 0.15 m long at 0.2 s, 16 % of its length"),
         ({"depth_m": 0.02}, "0.02 m deep in the ground at 0.2 s"),
         ({"gap_m": 0.06}, "strands of a crossing were 0.06 m apart at 0.2 s"),
-        ({"spring_length_m": np.full(42, 0.25)}, "an axial spring was 0.25 m long at 0.2 s, 3.3 times"),
     ],
 )
 def test_what_is_doubtful_is_kept(shown: dict[str, Any], words: str) -> None:
@@ -220,6 +219,13 @@ def test_rings_that_hardly_close_are_told_once_muscles_were_active_for_long() ->
     assert [each.startswith("no ring was shortened by more than 1 %") for each in looked.warnings(0.6)] == [True]
     looked.at(0.8, activation=on, **(weak | {"ring_length_m": np.full(looked.n, 0.9)}))
     assert looked.warnings(0.8) == ()
+
+
+def test_a_body_that_stretches_manyfold_is_told() -> None:
+    looked = Looked()
+    looked.at(0.1, spring_length_m=np.full(42, 0.25))
+    (warning,) = looked.warnings()
+    assert "an axial spring was 0.25 m long at 0.1 s, 3.3 times" in warning
 
 
 def test_a_cable_that_stays_slack_is_told(tmp_path: Path) -> None:

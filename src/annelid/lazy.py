@@ -63,8 +63,9 @@ def moved(package: str, now: str) -> Callable[[str], Any]:
         import warnings
         from importlib.util import find_spec
 
-        # Python asks here, too, before it imports a module of the package itself.
-        is_own = name.startswith("_") or find_spec(f"{package}.{name}") is not None
+        # Python asks here, too, before it imports a module of the package itself; a module has none.
+        is_package = not name.startswith("_") and hasattr(sys.modules[package], "__path__")
+        is_own = name.startswith("_") or (is_package and find_spec(f"{package}.{name}") is not None)
         found = None if is_own else getattr(import_module(now), name, None)
         if found is None:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")

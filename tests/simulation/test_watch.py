@@ -228,6 +228,13 @@ def test_rings_that_hardly_close_are_told_once_muscles_were_active_for_long() ->
     assert looked.warnings(0.8) == ()
 
 
+def test_a_body_that_stretches_manyfold_is_told() -> None:
+    looked = Looked()
+    looked.at(0.1, spring_length_m=np.full(42, 0.25))
+    (warning,) = looked.warnings()
+    assert "an axial spring was 0.25 m long at 0.1 s, 3.3 times" in warning
+
+
 def test_a_cable_that_stays_slack_is_told(tmp_path: Path) -> None:
     run = simulate(load_config("wang", SLACK), tmp_path, progress=False)
     assert any(warning.startswith("the actuators of segment 1 pulled nothing") for warning in run.warnings)

@@ -61,7 +61,8 @@ def test_the_first_use_of_the_engine_ends_in_a_sentence(tmp_path: Path) -> None:
     install(tmp_path, "mujoco", "3.17.0", "bbbb")
     code = (
         f"import sys; sys.path.insert(0, {str(tmp_path)!r}); import runpy; "
-        "sys.argv = ['annelid', 'build', 'riddle2023-rods']; runpy.run_module('annelid', run_name='__main__')"
+        "sys.argv = ['annelid', 'export', 'riddle2023-rods', '--to', 'mjcf']; "
+        "runpy.run_module('annelid', run_name='__main__')"
     )
     done = subprocess.run(
         [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False, timeout=120

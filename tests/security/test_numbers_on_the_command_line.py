@@ -28,29 +28,29 @@ WITH: dict[str, tuple[str, ...]] = {
     "run --jobs": ("--uncertainty", "2"),
     "check": (),
     "new": ("mine.toml",),
-    "build": ("-o", "worm.xml"),
     "compare": ("RUN", "nothere.csv", "--map", "nothere.toml"),
-    "gallery": ("nothing.png",),
-    "limit-cycle": ("riddle2022-planar", "--time", "stepped"),
+    "study gallery": ("nothing.png",),
+    "study limit-cycle": ("riddle2022-planar", "--time", "stepped"),
     "export": ("RUN", "--to", "csv", "-o", "out"),
-    "render --time": ("RUN", "-o", "frame.png"),
-    "render": ("RUN", "--video", "video.mp4"),
+    "draw --time": ("RUN", "-o", "frame.png"),
+    "draw": ("RUN", "--video", "video.mp4"),
     "view": ("riddle2022-planar", "--export", "page.html"),
     "sweep": ("nothere.toml",),
     "tune": ("nothere.toml",),
     "paper": ("--only", "nothing"),
-    "robustness": ("--controller", "nothing"),
-    "challenge": ("nothing",),
+    "study paper": ("--only", "nothing"),
+    "study robustness": ("--controller", "nothing"),
+    "study challenge": ("nothing",),
     "calibrate": ("nothere.toml",),
     "export-network": ("riddle2023-rods", "-o", "c"),
     "loop": ("riddle2022-planar", "--servos", "/no/such/port", "-o", "out"),
     "pseudo-robot --duration": ("riddle2022-planar", "--lag", "nan"),
     "pseudo-robot": ("riddle2022-planar", "--duration", "0.1"),
-    "experiment": ("--scheduler", "nothing"),
-    "experiment load-frame": ("riddle2022-planar",),
+    "study": ("--scheduler", "nothing"),
+    "study load-frame": ("riddle2022-planar",),
 }
 """What a command needs beside the option, chosen so that a value that is taken ends soon."""
-SLOW_ON_PURPOSE = {("limit-cycle --threshold", value) for value in ("0", "-1", "1e300", "1e-300")}
+SLOW_ON_PURPOSE = {("study limit-cycle --threshold", value) for value in ("0", "-1", "1e300", "1e-300")}
 """A threshold that is never reached is waited for through a minute of simulated time."""
 
 
@@ -86,7 +86,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_the_options_are_found() -> None:
     found = {f"{command} {option}" for command, option, _ in OPTIONS}
-    assert {"run --duration", "render --speed", "limit-cycle --threshold", "experiment load-frame --speed"} <= found
+    assert {"run --duration", "draw --speed", "study limit-cycle --threshold", "study load-frame --speed"} <= found
     assert len(found) > 20
 
 

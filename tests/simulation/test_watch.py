@@ -107,13 +107,6 @@ def test_what_is_doubtful_is_kept(shown: dict[str, Any], words: str) -> None:
     assert words in warning
 
 
-def test_a_body_that_stretches_manyfold_is_told() -> None:
-    looked = Looked()
-    looked.at(0.1, spring_length_m=np.full(42, 0.25))
-    (warning,) = looked.warnings()
-    assert "an axial spring was 0.25 m long at 0.1 s, 3.3 times" in warning
-
-
 def test_an_actuator_without_force_is_told_of_every_contraction() -> None:
     look = Looked("riddle2025")
     on = np.zeros(look.n)

@@ -215,7 +215,7 @@ def export_command(
         str,
         typer.Argument(
             metavar="RUN|PRESET|FILE.toml",
-            help="A run's folder or run.nc; for mjcf also a worm.",
+            help="A run's folder or run.nc; for mjcf also a worm, or a robot as MJCF (.xml).",
             autocompletion=worms_from,
         ),
     ],
@@ -282,7 +282,7 @@ def export_command(
             valid = f"takes {', '.join(sorted(kind.options))}" if kind.options else "takes the whole run"
             raise RunFileError(f"{option} has no effect on {kind.name}, which {valid}")
     kind.require()
-    if source in preset_names() or (source.endswith(".toml") and Path(source).is_file()):
+    if source in preset_names() or (Path(source).suffix in (".toml", ".xml") and Path(source).is_file()):
         if kind.worm is None:
             raise RunFileError(f"{kind.name} is written of a run, not of a worm: annelid run {source} makes one")
         target = Path(kind.default) if output is None else with_suffix(output, (kind.suffix,), kind.name)

@@ -300,3 +300,10 @@ def test_the_command_prints_findings_and_refuses(annelid: Command) -> None:
     assert refused.exit_code == 2
     assert "set [0.195, 0.3]" in refused.sentence()
     assert not Path("thin").exists()
+
+
+def test_a_robot_of_one_s_own_is_written_for_other_programs(annelid: Command) -> None:
+    robot = Path(__file__).parents[2] / "examples" / "robot" / "robot.xml"
+    done = annelid("export", robot, "--to", "mjcf", "-o", "new.xml")
+    assert done.exit_code == 0, done.err
+    assert mujoco.MjModel.from_xml_path("new.xml").nu == mujoco.MjModel.from_xml_path(str(robot)).nu

@@ -100,6 +100,7 @@ def loop_command(
     annelid loop riddle2023-rods --robot udp:192.168.1.7:4242 --rate 50  a robot with a protocol of annelid's
     annelid loop riddle2023-rods --firmware /dev/ttyACM0                 a microcontroller and the simulated worm
     annelid loop riddle2023-rods --servos /dev/ttyUSB0 --most 0.6 --most-rate 2   gently
+    annelid pseudo-robot riddle2023-rods                 without hardware: a robot of servos to try it with
     """
     from annelid.output import write_csv
     from annelid_lab.loop import Limits, Wiring, drive, open_link

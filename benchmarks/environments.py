@@ -52,7 +52,7 @@ def throughput(path: str = "", seconds: float = 12.0) -> None:
         rows.append([n_worms, *(steps_per_s(mode, n_worms, seconds) for mode in MODES)])
         print("{:5.1f} {:6} {:8.1f} {:8.1f}".format(load, *rows[-1]), flush=True)
     if path:
-        write_csv(Path(path), ["worms", *MODES], rows)
+        write_csv(Path(path), ["worms", *(f"{mode}_per_s" for mode in MODES)], rows)
 
 
 def timed_wave(time_s: float, n: int) -> np.ndarray:

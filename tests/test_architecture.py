@@ -123,6 +123,7 @@ BELOW = {SOURCE: set(), LAB: {"annelid"}, STUDIES: {"annelid", "annelid_lab"}}
 def test_the_packages_import_one_way_and_by_public_names() -> None:
     """The lab and the studies are written as anybody's code is: names in the ``__all__`` of annelid and its rooms."""
     wrong = []
+    assert all((package / "__init__.py").exists() for package in BELOW)
     for package, below in BELOW.items():
         for module in package.rglob("*.py"):
             for node in ast.walk(ast.parse(module.read_text(encoding="utf-8"))):

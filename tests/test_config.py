@@ -283,13 +283,17 @@ def test_unreadable_files_are_refused_in_one_sentence(tmp_path: Path) -> None:
 
 
 def test_names_that_have_moved_are_found_with_a_warning() -> None:
+    import annelid.analysis
     import annelid.export
     import annelid.nervous
     import annelid.planar
 
     for package, name in (
+        (annelid.analysis, "detect_slip"),
         (annelid.nervous, "phase_chain"),
+        (annelid.nervous, "import_network"),
         (annelid.export, "Firmware"),
+        (annelid.export, "lems_text"),
         (annelid.planar, "Riddle2022Plant"),
     ):
         with pytest.warns(DeprecationWarning, match=rf"{name} is now annelid_(lab|studies)\."):

@@ -23,12 +23,15 @@ if TYPE_CHECKING:
     from typing import Any
 
 
-def lazy(package: str, gone: Mapping[str, str] | None = None) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
+def lazy(
+    package: str, gone: Mapping[str, str] | None = None, now: tuple[str, ...] = ()
+) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
     """Returns the ``__getattr__`` and ``__dir__`` of a package, which load its public names on first use.
 
     Args:
         package: The package's ``__name__``.
         gone: Names that it had, and what to do instead.
+        now: Names of the packages that have what it had, as `moved` takes them.
     """
 
     @cache
@@ -45,18 +48,18 @@ def lazy(package: str, gone: Mapping[str, str] | None = None) -> tuple[Callable[
             # ``from package import name`` would replace the words of an AttributeError.
             raise ImportError(f"{package}.{name} has been removed: {gone[name]}")
         if name not in sys.modules[package].__all__:
-            raise AttributeError(f"module {package!r} has no attribute {name!r}")
+            return moved(package, *now)(name)
         return getattr(import_module(homes()[name]), name)
 
     return get, lambda: sorted(sys.modules[package].__all__)
 
 
-def moved(package: str, now: str) -> Callable[[str], Any]:
+def moved(package: str, *now: str) -> Callable[[str], Any]:
     """Returns the ``__getattr__`` of a package for names that lie elsewhere now: found with a warning, for one release.
 
     Args:
         package: The package's ``__name__``.
-        now: Name of the package that has them.
+        now: Names of the packages that have them.
     """
 
     def get(name: str) -> Any:
@@ -66,11 +69,11 @@ def moved(package: str, now: str) -> Callable[[str], Any]:
         # Python asks here, too, before it imports a module of the package itself; a module has none.
         is_package = not name.startswith("_") and hasattr(sys.modules[package], "__path__")
         is_own = name.startswith("_") or (is_package and find_spec(f"{package}.{name}") is not None)
-        found = None if is_own else getattr(import_module(now), name, None)
-        if found is None:
-            raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        warnings.warn(f"{package}.{name} is now {now}.{name}", DeprecationWarning, stacklevel=2)
-        return found
+        for home in () if is_own else now:
+            if (found := getattr(import_module(home), name, None)) is not None:
+                warnings.warn(f"{package}.{name} is now {home}.{name}", DeprecationWarning, stacklevel=2)
+                return found
+        raise AttributeError(f"module {package!r} has no attribute {name!r}")
 
     return get
 

@@ -15,8 +15,9 @@ import pytest
 from typer.main import get_command
 
 from annelid.arena.kinds.pipe import Pipe
-from annelid.cli import app
+from annelid.cli import app, command
 from annelid.config import field_paths, load_config, preset_names
+from annelid.errors import ConfigError
 from annelid.simulation.runfile import open_run
 from outcome import Command
 
@@ -212,7 +213,7 @@ def test_every_command_teaches_by_example(annelid: Command) -> None:
 def test_the_help_fits_a_page_and_cuts_no_line(annelid: Command) -> None:
     text = annelid("--help").out
     panels = text.partition("\nMake:")[2]
-    assert len(re.findall(r"^  [a-z]", panels, re.MULTILINE)) <= 16
+    assert 12 <= len(re.findall(r"^  [a-z]", panels, re.MULTILINE)) <= 16
     for words in (("--help",), ("study", "--help"), ("list", "--help")):
         assert "...\n" not in annelid(*words).out.partition("\n")[2]
 
@@ -307,3 +308,14 @@ def test_a_robot_of_one_s_own_is_written_for_other_programs(annelid: Command) ->
     done = annelid("export", robot, "--to", "mjcf", "-o", "new.xml")
     assert done.exit_code == 0, done.err
     assert mujoco.MjModel.from_xml_path("new.xml").nu == mujoco.MjModel.from_xml_path(str(robot)).nu
+
+
+def test_a_run_comes_before_a_preset_of_its_name(annelid: Command, finished: Path) -> None:
+    shutil.copytree(finished, "wang")
+    assert annelid("export", "wang", "--to", "csv", "-o", "tables").exit_code == 0
+    assert annelid("cite", "wang").out == annelid("cite", finished).out != annelid("cite", "riddle2025").out
+
+
+def test_a_command_in_no_panel_of_the_help_is_refused() -> None:
+    with pytest.raises(ConfigError, match=r"panel = 'Sea'.*did you mean 'See'"):
+        command("rings", "Sea")

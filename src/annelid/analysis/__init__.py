@@ -89,4 +89,4 @@ __all__ = [
     "turn_of",
 ]
 
-__getattr__, __dir__ = lazy(__name__)
+__getattr__, __dir__ = lazy(__name__, now=("annelid_studies.slip_detector",))

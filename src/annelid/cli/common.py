@@ -209,6 +209,19 @@ def config_of(
     return config
 
 
+def names_worm(source: str) -> bool:
+    """Returns whether a word names a worm, as a preset or a file, and no run: a run that is there comes first.
+
+    Args:
+        source: As the user gave it.
+    """
+    from annelid.config import preset_names
+    from annelid.simulation.runfile import FILE_NAME
+
+    path = Path(source)
+    return not (path / FILE_NAME).exists() and (source in preset_names() or path.suffix in (".toml", ".xml"))
+
+
 def refuse_existing(path: Path, force: bool, option: str = "-o") -> None:
     """Raises `RunFileError` where an output file exists without --force, or cannot be written; an option names it.
 

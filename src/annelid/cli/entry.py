@@ -19,7 +19,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from annelid.cli.result import with_json
-from annelid.errors import AnnelidError, RunKilled, SimulationStopped
+from annelid.errors import AnnelidError, ConfigError, RunKilled, SimulationStopped, shown, suggest
 from annelid.text import write_printable_only
 
 EXIT_DONE = 0
@@ -149,8 +149,8 @@ class Command(TyperCommand):
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Reads the options, and refuses infinite ones and those that are not a number."""
         _typed.set((*ctx.command_path.split()[1:], *args))
-        had_clusters = any("--scheduler" in one.opts for one in self.params)
-        if had_clusters and ("ANNELID_CLUSTER" in os.environ or any(word.startswith("--cluster") for word in args)):
+        takes_scheduler = any("--scheduler" in one.opts for one in self.params)
+        if takes_scheduler and ("ANNELID_CLUSTER" in os.environ or any(word.startswith("--cluster") for word in args)):
             raise typer.BadParameter(
                 "--cluster and ANNELID_CLUSTER are no more: leave them out for processes of this machine, give a Dask "
                 "scheduler's address to --scheduler, and see docs/sweeps.md for Slurm",
@@ -188,7 +188,12 @@ def command(name: str, panel: str, *, as_json: bool = True) -> Callable[[Functio
         name: Name of the command.
         panel: Heading of the help that it stands under, one of `PANELS`; empty for a command that the help leaves out.
         as_json: Whether it has the option ``--json`` beside its parameters.
+
+    Raises:
+        ConfigError: There is no such panel.
     """
+    if panel and panel not in PANELS:
+        raise ConfigError(f"command {name!r}: panel = {shown(panel)}: {suggest(panel, PANELS)}")
     return _joins(app, name, as_json=as_json, hidden=not panel, rich_help_panel=panel)
 
 

@@ -16,6 +16,7 @@ from annelid.cli.common import (
     RunPath,
     Segments,
     config_of,
+    names_worm,
     numbers_of,
     overrides_of,
     play,
@@ -188,7 +189,7 @@ def view_command(
     annelid view runs/riddle2023-rods-001 --export walk.html   as one page to send by mail
     """
     worm: RunConfig | Run
-    if source and not source.endswith(".toml") and Path(source).exists():
+    if source and not names_worm(source) and Path(source).exists():
         from annelid.simulation.runfile import open_run
 
         if (assignments, segments, fidelity, arena) != (None, None, None, None):
@@ -268,7 +269,6 @@ def export_command(
     annelid export runs/riddle2023-rods-001 --to html -o report.html
     annelid export riddle2025 --arena pipe.s --to mjcf -o worm_in_pipe.xml
     """
-    from annelid.config import preset_names
     from annelid.draw.gallery import task_bar
     from annelid.export import Selection, find_format, selected
     from annelid.output import with_suffix, write_text
@@ -282,10 +282,14 @@ def export_command(
             valid = f"takes {', '.join(sorted(kind.options))}" if kind.options else "takes the whole run"
             raise RunFileError(f"{option} has no effect on {kind.name}, which {valid}")
     kind.require()
-    if source in preset_names() or (Path(source).suffix in (".toml", ".xml") and Path(source).is_file()):
+    if names_worm(source):
         if kind.worm is None:
             raise RunFileError(f"{kind.name} is written of a run, not of a worm: annelid run {source} makes one")
-        target = Path(kind.default) if output is None else with_suffix(output, (kind.suffix,), kind.name)
+        target = (
+            Path(kind.default)
+            if output is None
+            else with_suffix(output, (kind.suffix,), kind.name, default=kind.suffix)
+        )
         refuse_existing(target, force)
         worm = config_of(source, overrides_of(assignments), segments, fidelity, arena)
         print_paths([write_text(target, kind.worm(worm))])
@@ -340,14 +344,12 @@ def cite_command(
         typer.echo(bibtex(entries().keys() if everything else references_of()), nl=False)
         return
     from annelid.config import load_config, preset_names
-    from annelid.simulation.runfile import FILE_NAME, read_config
+    from annelid.simulation.runfile import read_config
 
-    # A name may be all of these: a run comes first, then a file or a preset.
-    known, path = source.endswith(".toml") or source in preset_names(), Path(source)
-    if (path / FILE_NAME).exists() or (path.exists() and not known):
-        config = read_config(path)
-    elif known:
+    if names_worm(source):
         config = load_config(source)
+    elif Path(source).exists():
+        config = read_config(source)
     else:
         raise ConfigError(f"{source!r} is neither a run nor a preset: {suggest(source, preset_names())}")
     typer.echo(bibtex(references_of(config)), nl=False)

@@ -15,4 +15,4 @@ __all__ = [
     "selected",
     "signal_names",
 ]
-__getattr__ = moved(__name__, "annelid_lab.firmware")
+__getattr__ = moved(__name__, "annelid_lab.firmware", "annelid_lab.lems")

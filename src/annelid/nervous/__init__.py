@@ -96,4 +96,4 @@ __all__ = [
     "subtraction",
     "transmission",
 ]
-__getattr__ = moved(__name__, "annelid_studies.oscillators")
+__getattr__ = moved(__name__, "annelid_studies.oscillators", "annelid_lab.sns_toolbox")

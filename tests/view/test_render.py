@@ -10,7 +10,6 @@ import mujoco
 import numpy as np
 import pytest
 
-from annelid.body import mesh_of
 from annelid.body.worm import WormBody
 from annelid.config import load_config
 from annelid.draw.overlay import Overlay, bar_length, length_name
@@ -258,7 +257,7 @@ def test_soft_crossings_have_a_bar_to_each_strand(subtests: pytest.Subtests) -> 
             worm.pose(worm.model.qpos0)
             scene = mujoco.MjvScene(worm.model, maxgeom=1000)
             worm.add_links(scene)
-            assert scene.ngeom == n_links * mesh_of(config.body.mesh).n_crossings
+            assert scene.ngeom == n_links * config.body.geometry().n_crossings
             assert ("soft" in worm.legend()[-1][0]) == (n_links > 0)
 
 

@@ -18,12 +18,10 @@ from annelid.analysis.paper import (
     agreement,
     changed_fields,
     formulation,
-    has_rigid_crossings,
     references,
     stands_for_the_papers,
 )
 from annelid.analysis.summary import Summary
-from annelid.body.worm import WormBody
 from annelid.config import field_value, fields_of, toml_value
 from annelid.errors import listed, shortened
 
@@ -219,7 +217,7 @@ def _rows_by_field(numbers: Summary, config: RunConfig) -> dict[str, tuple[str, 
     wave = f"yes, {cycles}" if numbers.wave else "too short to judge" if numbers.wave is None else f"no ({cycles})"
     cells = [("segment at onset (s)", onsets + more or "none", "order"), ("wave 1-2-..-N", wave, "wave")]
     # A planar worm has one sensor per segment, and no name for it.
-    sensor = f", {config.body.springs.first_sensor}" if isinstance(config.body, WormBody) else ""
+    sensor = f", {config.body.first_sensor}" if config.body.first_sensor else ""
     for field, row in SUMMARY_ROWS.items():
         if sensor or ", mean" not in row[0]:
             text = quantity(getattr(numbers, field), *row[1:])
@@ -253,18 +251,18 @@ def legend(numbers: Summary, config: RunConfig) -> str:
     said = [f"pp: peak to peak. [P]: published, {paper}, {places}."]
     if stands_for_the_papers(config):
         said.append(f"Other references: {FORMULATION}, the paper's own formulation.")
-        said += [_about_rigid_crossings(numbers)] if has_rigid_crossings(config) else []
+        said += [_about_rigid_crossings(numbers)] if config.body.has_rigid_crossings else []
     return " ".join(said)
 
 
 def closing_sentence(numbers: Summary, config: RunConfig) -> str:
     """Says what is changed of a preset, or whether a run reproduces the paper's own formulation; else nothing."""
-    if not references(config) or not isinstance(config.body, WormBody):
+    if not references(config):
         return ""
     preset, changed = changed_fields(config)
     if changed:
         return f"this run differs from {preset} in {listed(changed)}: the references are those of the unchanged worm"
-    if not stands_for_the_papers(config) or has_rigid_crossings(config) or numbers.status != "complete":
+    if not stands_for_the_papers(config) or config.body.has_rigid_crossings or numbers.status != "complete":
         return ""
     found = agreement(numbers)
     within = f"{100 * ELONGATION_WITHIN:g} %"

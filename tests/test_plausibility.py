@@ -221,8 +221,8 @@ def test_no_tolerance_is_suggested_where_none_is_known_to_do() -> None:
 
 def test_bodies_that_were_not_measured_have_no_window(subtests: pytest.Subtests) -> None:
     for name in ("riddle2023", "riddle2023-fast", "riddle2025", "riddle2025-muscles", "wang"):
-        with subtests.test(f"{name!r:.60}"), pytest.raises(ConfigError, match="needs the 3D worm"):
-            tolerance_window_m(load_config(name))
+        with subtests.test(f"{name!r:.60}"):
+            assert tolerance_window_m(load_config(name)) is None
 
 
 def test_a_ring_touches_where_its_strands_do() -> None:

@@ -189,7 +189,7 @@ def test_no_kind_is_told_apart_outside_its_room() -> None:
                 kinds = [part for part in parts if isinstance(part, ast.Attribute) and part.attr == "kind"]
                 asked = {text for part in kinds if (text := ast.unparse(part)).split(".")[-2].lstrip("_") in SECTIONS}
             rooms = module.resolve().parents
-            wrong += [(str(module), node.lineno, name) for name in asked if home.get(name) not in rooms]
+            wrong += [(str(module), ast.unparse(node), name) for name in asked if home.get(name) not in rooms]
     assert not wrong
 
 

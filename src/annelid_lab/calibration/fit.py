@@ -19,7 +19,7 @@ from annelid.config import RunConfig, check_section, load_config
 from annelid.errors import ConfigError, SimulationStopped
 from annelid.protocols import Array
 from annelid_lab.calibration.base import Data, Experiment, Found
-from annelid_lab.calibration.noise import Noise, estimated, solved, whitened
+from annelid_lab.calibration.noise import Noise, estimated, whitened
 from annelid_lab.calibration.simulations import Simulations
 from annelid_lab.calibration.study import IdentifyStudy
 
@@ -340,8 +340,3 @@ def _refuse_unlike(study: IdentifyStudy, model: Model, predicted: Sequence[Array
                 f"the data of experiments.{one.name} reach {sizes[0]:.3g} {data.unit}, the worm that the fit starts "
                 f"from {sizes[1]:.3g} {data.unit}: is a unit wrong?"
             )
-
-
-def relative_gain(fit: Fit) -> list[Array]:
-    """How the parameters' logarithms follow from each experiment's residuals, ``(p, n)``, to first order."""
-    return [fit.covariance @ solved(part.root, part.jacobian).T for part in fit.parts]

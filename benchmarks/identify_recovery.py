@@ -21,12 +21,10 @@ from numpy.typing import NDArray
 from annelid import load_config
 from annelid.experiment import SHEAR_OVER_YOUNG
 from annelid.output import write_csv
+from annelid_lab.calibration import Loop, cable_force, identify, load_identify_study
 from annelid_lab.calibration.kinds.load_frame import FrameTest
 from annelid_lab.calibration.kinds.ring_down import RingDown
 from annelid_lab.calibration.kinds.tensile import Tensile
-from annelid_lab.calibration.load_frame import Loop, cable_force
-from annelid_lab.calibration.report import identify
-from annelid_lab.calibration.study import load_identify_study
 
 ROBOTS = 50
 REACH_M = 0.24

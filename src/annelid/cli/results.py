@@ -45,8 +45,8 @@ def show_command(
 
     Beside them stand the published ones, where there are any.
 
-    A run that has ended carries a digest of every variable. Files up to 64 MB are compared with theirs whenever they
-    are opened, larger ones with --verify only, which names the variables that are damaged.
+    A run that has ended carries a digest of all its bytes. Files up to 64 MB are compared with theirs whenever they
+    are opened, larger ones with --verify only.
 
     \b
     annelid show runs/riddle2023-001

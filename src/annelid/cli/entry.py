@@ -43,6 +43,7 @@ PANELS = ("Make", "See", "Vary", "Exchange", "Robot", "Studies", "Help")
 _OLD: Mapping[str, tuple[str, ...]] = {
     "build": ("export", "--to", "mjcf"),
     "experiment": ("study",),
+    "pseudo-robot": ("loop", "--pseudo"),
     **dict.fromkeys(("plot", "render"), ("draw",)),
     **{name: ("list", name) for name in ("presets", "arenas", "runs")},
     **{name: ("study", name) for name in ("limit-cycle", "bench", "robustness", "challenge", "gallery")},

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from annelid.body.worm import WormBody
+from annelid.analysis.numbers import finite, number
 from annelid.errors import RunFileError
 from annelid.morphology import heading_turn
 from annelid.protocols import Array
@@ -22,8 +22,7 @@ _CLEARLY = 3.0
 
 def first_heading(run: Run) -> Array:
     """Returns the direction in which a run's worm leads at the start, seen from above, ``(2,)``."""
-    body = run.config.body
-    heading_deg = body.heading_deg if isinstance(body, WormBody) else 0.0
+    heading_deg = run.config.body.first_heading_deg
     return heading_turn(heading_deg)[:2, :2] @ _FORWARDS if heading_deg else _FORWARDS
 
 
@@ -33,6 +32,26 @@ def forward_position(run: Run) -> Array:
     along: Array = ahead[0] * centre.sel(axis="x").values
     # A planar worm moves along x alone.
     return along + ahead[1] * centre.sel(axis="y").values if ahead[1] else along
+
+
+@dataclass(frozen=True, kw_only=True)
+class Travel:
+    """How far a worm came, along its initial heading."""
+
+    travel_m: float | None = number(
+        "displacement of the centre of mass, negative backwards", "travel forwards, centre of mass", 1000.0, 1, "mm"
+    )
+    travel_path_m: float | None = number(
+        "length of its path forwards and backwards", "travel, forth and back", 1000.0, 1, "mm"
+    )
+
+
+def travel(run: Run) -> Travel:
+    """Reads the travel of a run; None for a worm that stays in its place or was not recorded."""
+    if "center_of_mass" not in run.data or not run.data.sizes.get("time"):
+        return Travel()
+    ahead = forward_position(run)
+    return Travel(travel_m=finite(ahead[-1] - ahead[0]), travel_path_m=finite(np.abs(np.diff(ahead)).sum()))
 
 
 @dataclass(frozen=True)
@@ -92,16 +111,15 @@ def track_of(run: Run) -> Track:
     """Reads the track of a 3D worm from its run.
 
     Raises:
-        RunFileError: The run is of another body than the 3D worm, or has fewer than two recorded postures.
+        RunFileError: The run is of a body without a mesh, or has fewer than two recorded postures.
     """
-    body, data = run.config.body, run.data
-    if not isinstance(body, WormBody):
+    geometry, data = run.config.body.geometry(), run.data
+    if geometry is None:
         raise RunFileError(f"{run.path} has no track: only the 3D worm (body.kind = 'worm') records one")
     if data.sizes.get("frame", 0) < 2 or "crossing_position" not in data:
         raise RunFileError(f"{run.path} holds fewer than two recorded postures, and so no track")
-    mesh = body.mesh
-    rings = (mesh.free_planes_at_ends + mesh.planes_between_rings * segment for segment in range(mesh.n_segments))
-    return Track(data["frame_time"].values, data["crossing_position"].values, mesh.n_helices // 2, tuple(rings))
+    rings = tuple(geometry.ring_planes.tolist())
+    return Track(data["frame_time"].values, data["crossing_position"].values, geometry.n_per_plane, rings)
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
+from importlib.resources import files
 from math import isfinite
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -12,23 +14,35 @@ from typing import Any, Literal, get_args
 from annelid.errors import suggest
 from annelid.experiment import Case, Store
 from annelid.markdown import Table
+from annelid.textfiles import parse_toml
 from annelid_studies.worms import Effort
 
 Verdict = Literal["holds", "holds within", "rests on", "does not hold", "not testable here"]
 Number = float | str | None
 
 
+@cache
+def texts(name: str) -> Mapping[str, Any]:
+    """Reads one of the files of words beside this module, by its path."""
+    return parse_toml((files("annelid_studies.riddle2023") / name).read_text(encoding="utf-8"), name)
+
+
+def filled(text: str, values: Mapping[str, Any] | None = None) -> str:
+    """Returns a text of such a file on one line, with values in the place of names in braces."""
+    return " ".join(text.split()).format_map(values or {})
+
+
 @dataclass(frozen=True)
 class Claim:
-    """One claim of the paper and what became of it."""
+    """One claim of the paper and what became of it; ``claims/claims.toml`` explains the words."""
 
-    topic: str  # Structure, sensing, actuation, results, discussion, future work
-    claim: str  # What the paper says, in our words
-    place: str  # Where it says so
-    paper: str  # The paper's number or words
-    ours: str  # Our number or words
-    evidence: str  # Why we say so, in one to three sentences; for a claim that fails, its cause as far as we found it
-    command: str  # The command that makes our number
+    topic: str
+    claim: str
+    place: str
+    paper: str
+    ours: str
+    evidence: str
+    command: str
     verdict: Verdict  # Whether it holds
     within: str = ""  # How nearly, for example "4.5 %", where it holds within something; what it rests on
 

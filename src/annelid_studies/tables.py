@@ -29,6 +29,11 @@ def tabulated(rows: Iterable[T], columns: Mapping[str, Callable[[T], str]]) -> T
     return Table(list(columns), [[cell(row) for cell in columns.values()] for row in rows])
 
 
+def records(table: Table) -> list[dict[str, str]]:
+    """Returns the rows of a table, each by its heads, for JSON."""
+    return [dict(zip(table.header, row, strict=True)) for row in table.rows]
+
+
 def terminal_table(table: Table, title: str, *, n_words: int = 1, caption: str = "") -> TerminalTable:
     """Returns a table for the terminal, of columns of words, set flush left, and then columns of numbers."""
     shown = TerminalTable(title=title, caption=caption or None)

@@ -22,7 +22,6 @@ from annelid_studies.riddle2023.claims.evidence import (
 )
 from annelid_studies.riddle2023.examinations.friction import PAPERS_FRICTION, SLIPPERY
 from annelid_studies.riddle2023.figures.propagation import measure_propagation
-from annelid_studies.riddle2023.words import span
 from annelid_studies.worms import chain, fast, one_after_the_other, rods
 
 SLIGHT_M = 0.001
@@ -37,8 +36,8 @@ def propagation(evidence: Evidence) -> Judgement:
         for which in ([one.near for one in seen], [one.far for one in seen])
     )
     return judged((abs(one) > 5 * abs(other) for one, other in zip(nearby, far, strict=True)), "the run"), {
-        "near": span(nearby, 100, 0),
-        "far": span(far, 100, 0),
+        "near": nearby,
+        "far": far,
         "time_s": seen[0].posture.time_s,
     }
 
@@ -51,7 +50,7 @@ def neighbours(evidence: Evidence) -> Judgement:
     # Shape (n_runs, 3, n_readings).
     lifts = np.array([_lifts(run) for _, run in evidence.runs])
     return judged((lifts > SLIGHT_M).ravel(), "how the elongation is read"), {
-        "lifts": [span(lifts[:, i], 1e3, 0) for i in range(3)],
+        "lifts": [lifts[:, i] for i in range(3)],
         "slight_mm": 1e3 * SLIGHT_M,
         "settled": settled.preset,
         "second_mm": 1e3 * first[1],
@@ -96,7 +95,7 @@ def interior(evidence: Evidence) -> Judgement:
         "shortfalls": "; ".join(listed),
         "segments": sum(map(len, shortfalls.values())),
         "worms": len(shortfalls),
-        "below": 100 * below.mean(),
+        "below": below.mean(),
         "longest": longer_worm(6, "rods").command,
     }
 
@@ -143,8 +142,8 @@ def robot(evidence: Evidence) -> Judgement:
     return verdict, {
         "robot": _relative(ROBOT_ELONGATION_M),
         "worms": "; ".join(f"{LABELS[worm]} {_relative(own[:, -1])}" for worm, own in held.items()),
-        "weak": span(weak, 100, 0),
-        "robots_deficit": 100 * middle_deficit(ROBOT_ELONGATION_M),
+        "weak": weak,
+        "robots_deficit": middle_deficit(ROBOT_ELONGATION_M),
         "four_segments": longer_worm(4, "fast").command,
     }
 
@@ -159,7 +158,7 @@ def gravity(evidence: Evidence) -> Judgement:
     weight_N = float(evidence.runs[0][1].data.attrs["total_mass_kg"]) * 9.81
     upward = [(run.data["contact_force"].sel(axis="z").values, run.data["time"].values) for _, run in evidence.runs]
     loads = [float(force[time > 0.5].sum(axis=1).mean()) for force, time in upward]
-    return near(loads, weight_N, "the run"), {"loads": span(loads), "weight_N": weight_N}
+    return near(loads, weight_N, "the run"), {"loads": loads, "weight_N": weight_N}
 
 
 @judges
@@ -172,9 +171,9 @@ def speed(evidence: Evidence) -> Judgement:
         for case in (fast(), rods())
     }
     return judged((abs(travel) < NEGLIGIBLE * body_m for travel in ours), "the run"), {
-        "travels_mm": span(ours, 1e3, 0),
-        "travels": span(ours, 100 / body_m, 1),
-        "negligible": 100 * NEGLIGIBLE,
+        "travels": ours,
+        "shares": np.divide(ours, body_m),
+        "negligible": NEGLIGIBLE,
         "others": ", ".join(f"{1e3 * travel:+.0f} mm ({name})" for name, travel in others.items()),
     }
 

@@ -18,8 +18,9 @@ from annelid.experiment import Case, Outcome, Store
 from annelid.morphology import Array
 from annelid.simulation import Run
 from annelid_studies import slip
-from annelid_studies.riddle2023.contents import Claim, Findings, Verdict, filled, texts
+from annelid_studies.riddle2023.contents import Claim, Findings, Verdict
 from annelid_studies.riddle2023.examinations.design import WORMS
+from annelid_studies.riddle2023.words import filled, texts
 from annelid_studies.worms import CHAIN, FAST, PLANAR, Effort, chain, fast, one_after_the_other, rods
 
 MAIN = Case(CHAIN)
@@ -111,12 +112,12 @@ def rule(evidence: Evidence) -> list[str]:
     periods = [evidence.store[case].rhythm.period_s or nan for case in perturbed]
     text = texts("claims/claims.toml")["rule"]
     found = {
-        "which": filled(text[evidence.effort]),
+        "which": filled(text[evidence.effort], {}),
         "n": len(perturbed),
         "all_runs": len(perturbed) + 1,
         "seeds": f"{n_seeds} seed{'s' if n_seeds > 1 else ''}",
         "preset": preset,
-        "apart": 100 * float(np.max(np.ptp(swings, axis=0) / np.mean(swings, axis=0))),
+        "apart": float(np.max(np.ptp(swings, axis=0) / np.mean(swings, axis=0))),
         "periods_ms": 1e3 * float(np.ptp(periods)),
         "exact": 100 * EXACT,
         "near": 100 * NEAR,

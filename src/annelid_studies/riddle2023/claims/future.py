@@ -16,7 +16,6 @@ from annelid_studies.riddle2023.claims.evidence import (
 )
 from annelid_studies.riddle2023.examinations.design import WORMS
 from annelid_studies.riddle2023.examinations.friction import PAPERS_FRICTION, frictions_of
-from annelid_studies.riddle2023.words import span
 from annelid_studies.slip_detector import detect_slip, score_detections
 
 RELIABLE = 0.9
@@ -88,9 +87,9 @@ def slip(evidence: Evidence) -> Judgement:
     found = [score_detections([one], slip_study.LIMIT_M_PER_S) for one in detections]
     verdict = judged((min(one.precision, one.recall) >= RELIABLE for one in found), "the gait and the friction")
     return verdict, {
-        "precision": span((one.precision for one in found), digits=2),
-        "recall": span((one.recall for one in found), digits=2),
-        "found": span((one.found for one in found), 100, 0),
+        "precision": [one.precision for one in found],
+        "recall": [one.recall for one in found],
+        "found": [one.found for one in found],
         "runs": len(found),
         "names": "; ".join(names),
         "reliable": RELIABLE,

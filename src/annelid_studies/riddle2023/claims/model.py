@@ -83,9 +83,9 @@ def pins(evidence: Evidence) -> Judgement:
     """Strands stay within the radius of a pin."""
     gaps = [outcome.summary.pin_gap_max_m or nan for outcome, _ in evidence.runs]
     return judged(gap < PIN_RADIUS_M for gap in gaps), {
-        "gaps": span(gaps, 1e3, 0),
+        "gaps": gaps,
         "radius_mm": 1e3 * PIN_RADIUS_M,
-        "rigid_cm": 100 * evidence.number("pins", "elongation_tight_first_m"),
+        "rigid": evidence.number("pins", "elongation_tight_first_m"),
     }
 
 
@@ -116,12 +116,10 @@ def elements(evidence: Evidence) -> Judgement:
 def springs(evidence: Evidence) -> Judgement:
     """Such springs make the paper's number, in the worm nearest to the paper's that was run so."""
     worms = WORMS if evidence.effort == "full" else WORMS[1:]
-    pulling, both = (100 * readings_m(evidence.store.run(worms[0].case(changes)))[0] for changes in (TENSION_ONLY, {}))
-    return near(pulling, 4.20, "how the elongation is read"), {
-        "pulling": span(pulling),
-        "pulling_first": pulling[0],
-        "both": span(both),
-        "both_first": both[0],
+    pulling, both = (readings_m(evidence.store.run(worms[0].case(changes)))[0] for changes in (TENSION_ONLY, {}))
+    return near(pulling, 0.042, "how the elongation is read"), {
+        "pulling": pulling,
+        "both": both,
         "worm": worms[0].label,
         "walks": sum(evidence.store[worm.case(TENSION_ONLY)].rhythm.is_one_wave for worm in worms),
         "worms": len(worms),
@@ -149,8 +147,8 @@ def force(evidence: Evidence) -> Judgement:
     summaries, body = [one.summary for one, _ in evidence.runs], _body()
     peaks = [summary.contraction_force_peak_N or nan for summary in summaries]
     return near(peaks, 2.5, "the run"), {
-        "peaks": span(peaks, digits=1),
-        "medians": span(summary.contraction_force_median_N or nan for summary in summaries),
+        "peaks": peaks,
+        "medians": [summary.contraction_force_median_N or nan for summary in summaries],
         "peak_N": max(body.muscles.forces(body.n_segments)),
     }
 
@@ -170,8 +168,8 @@ def shortest_muscle(evidence: Evidence) -> Judgement:
         for changes in (one_after_the_other(), SHORT_MINIMUM)
     )
     return judged((ours < theirs for ours, theirs in zip(short, usual, strict=True)), "the segment"), {
-        "usual": span(usual, 100, 1),
-        "short": span(short, 100, 1),
+        "usual": usual,
+        "short": short,
         "contractions": len(usual),
         "shorter": rods(SHORT_MINIMUM).command,
     }
@@ -195,11 +193,10 @@ def same_network(evidence: Evidence) -> Judgement:
         for start, scheme in pairs:
             gates[start].append(evidence.store[variant(worm, start, scheme)].rhythm.is_one_wave)
     verdict = judged(walks + gates["toolbox"] + gates["steady"], "the worm and how its gates start")
-    counts = {start: sum(own) for start, own in gates.items()} | {
-        f"of_{start}": len(own) for start, own in gates.items()
-    }
-    periods = span([rhythm.period_s or nan for rhythm in rhythms], digits=3)
-    return verdict, {"walks": sum(walks), "runs": len(walks), "periods": periods, **counts}
+    counts = {start: sum(own) for start, own in gates.items()}
+    of_all = {f"of_{start}": len(own) for start, own in gates.items()}
+    periods = [rhythm.period_s or nan for rhythm in rhythms]
+    return verdict, {"walks": sum(walks), "runs": len(walks), "periods": periods, **counts, **of_all}
 
 
 @judges
@@ -207,8 +204,8 @@ def half_centres(evidence: Evidence) -> Judgement:
     """One neuron of a half-centre is excited at a time, and activation follows it."""
     shares = [_half_centres(run) for _, run in evidence.runs]
     return judged((both < 0.05 and following > 0.95 for both, following in shares), "the run"), {
-        "both": span((both for both, _ in shares), 100, 1),
-        "following": span((following for _, following in shares), 100, 1),
+        "both": [both for both, _ in shares],
+        "following": [following for _, following in shares],
     }
 
 

@@ -46,10 +46,10 @@ def order(evidence: Evidence) -> Judgement:
 def period(evidence: Evidence) -> Judgement:
     """Every run has the period of the paper's figure 7."""
     periods = [outcome.rhythm.period_s or nan for outcome, _ in evidence.runs]
-    return near(periods, 2.6, "the run"), {"periods": span(periods, digits=3)}
+    return near(periods, 2.6, "the run"), {"periods": periods}
 
 
-def _judge_readings(evidence: Evidence, paper: float, unit: str, measure: Callable[[Array], Array]) -> Judgement:
+def _judge_readings(evidence: Evidence, paper: float, unit: str, measure: Callable[[Array], float]) -> Judgement:
     """Judges a number by every reading of it, of each of the six springs and of their mean, in every run.
 
     Args:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import astuple
 from pathlib import Path
 from typing import Any, TypeVar
@@ -14,6 +14,8 @@ from annelid.output import write_csv
 
 T = TypeVar("T")
 K = TypeVar("K")
+Results = tuple[Sequence[Path], Sequence[TerminalTable]]
+"""What a study leaves: the files that it has written, and tables for the terminal."""
 
 
 def grouped(items: Iterable[T], key: Callable[[T], K]) -> dict[K, list[T]]:

@@ -12,9 +12,9 @@ from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 
 from annelid.draw import WIDTH_IN, canvas, panel_title, picture_axes, save_both
-from annelid.draw import rhombi as flat_rhombi
 from annelid.morphology import Array, MeshGeometry
 from annelid.simulation import Run
+from annelid_studies.planar import rhombi as flat_rhombi
 from annelid_studies.riddle2023.figures.renderings import (
     Place,
     Posture,

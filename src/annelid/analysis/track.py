@@ -123,7 +123,11 @@ def track_of(run: Run) -> Track:
 
 
 def nearest_frame(run: Run, time_s: float) -> int:
-    """Returns the index of the recorded posture nearest to a time, s.
+    """Returns the index of the recorded posture nearest to a time.
+
+    Args:
+        run: The run.
+        time_s: The time, s.
 
     Raises:
         RunFileError: No postures recorded, or the time lies more than a frame's interval outside of them.

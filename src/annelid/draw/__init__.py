@@ -27,12 +27,11 @@ if TYPE_CHECKING:
     from annelid.draw.canvas import plain, save
     from annelid.draw.figures import RUN_FIGURES
     from annelid.draw.figures.comparison import lengths_figure, potentials_figure, travel_figure
-    from annelid.draw.figures.experiments import Mark, Panel, load_frame_figure, progress_figure, uncertainty_figure
+    from annelid.draw.figures.experiments import Panel, load_frame_figure, progress_figure, uncertainty_figure
     from annelid.draw.figures.network_diagram import network_figure
     from annelid.draw.gl import find_backend
     from annelid.draw.overlay import legend_handle
     from annelid.draw.page import html_page
-    from annelid.draw.planar_scene import bent_rhombi, rhombi
     from annelid.draw.plots import figure7, plot_path
     from annelid.draw.render import DEFAULT_CAMERA, render_frame, render_video
     from annelid.draw.scene import CONTRACTED_WIDTH, SPRING_RGBA, Skeleton, WormScene, postures_of, render_still
@@ -49,12 +48,10 @@ __all__ = [
     "UNKNOWN",
     "VIEWS_DEG",
     "WIDTH_IN",
-    "Mark",
     "Panel",
     "Skeleton",
     "WormScene",
     "activation_color",
-    "bent_rhombi",
     "canvas",
     "comparison_table",
     "draw_lines",
@@ -80,7 +77,6 @@ __all__ = [
     "render_frame",
     "render_still",
     "render_video",
-    "rhombi",
     "save",
     "save_both",
     "segment_colors",
@@ -88,4 +84,6 @@ __all__ = [
     "uncertainty_figure",
 ]
 
-__getattr__, __dir__ = lazy(__name__)
+__getattr__, __dir__ = lazy(
+    __name__, {"Mark": "progress_figure takes the values of the trials"}, ("annelid_studies.planar",)
+)

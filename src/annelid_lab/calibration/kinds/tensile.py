@@ -14,11 +14,11 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from annelid.body import WormBody
+from annelid.body import worm_of
 from annelid.config import Length, Line, Positive, RunConfig
 from annelid.errors import ConfigError
 from annelid.protocols import Array
-from annelid_lab.calibration.base import Data, Experiment, Found, beside, binned, read_columns
+from annelid_lab.calibration.base import Data, Experiment, Found, binned, file_beside, read_columns
 
 
 class Tensile(Experiment):
@@ -51,7 +51,7 @@ class Tensile(Experiment):
 
     def read(self, folder: Path) -> Data:
         """Reads force, N, over strain."""
-        path = beside(folder, self.data, f"experiments.{self.name}.data")
+        path = file_beside(folder, self.data, f"experiments.{self.name}.data")
         columns, notes = read_columns(path, self.time, {self.elongation: "m", self.force: "N"})
         strain = columns[self.elongation] / self.length_m
         kept = (strain > 0) & (strain <= self.largest_strain)
@@ -69,9 +69,7 @@ class Tensile(Experiment):
 
     def tension(self, config: RunConfig, strain: Array) -> Array:
         """Returns the force of a worm's tube at strains, ``(n,)``, N."""
-        body = config.body
-        if not isinstance(body, WormBody):
-            raise ConfigError(f"body.kind = {body.kind!r} has no strands: an experiment of kind 'tensile' needs 'worm'")
+        body = worm_of(config)
         outer, inner = self.outer_diameter_m / 2, self.inner_diameter_m / 2
         # The tube bends like the strand, whatever section the strand's radius stands for.
         linear = body.strands.bending_rigidity_Nm2 / (pi / 4 * (outer**4 - inner**4))

@@ -7,7 +7,7 @@ from math import isnan, nan, pi, sqrt
 import numpy as np
 
 from annelid.analysis import CONTRACTED
-from annelid.body import WormBody, mesh_of
+from annelid.body import worm_of
 from annelid.config import field_value
 from annelid.simulation import Run
 from annelid_studies.riddle2023.claims.evidence import (
@@ -35,12 +35,6 @@ from annelid_studies.worms import fast, one_after_the_other, rods
 PIN_RADIUS_M = 0.005
 
 
-def _body() -> WormBody:
-    body = MAIN.config.body
-    assert isinstance(body, WormBody)
-    return body
-
-
 @judges
 def planar_rhombus(evidence: Evidence) -> Judgement:
     """Its sides keep their length at every sample of a run of the planar worm."""
@@ -54,7 +48,7 @@ def planar_rhombus(evidence: Evidence) -> Judgement:
 @judges
 def mesh(evidence: Evidence) -> Judgement:
     """The mesh has as many strands and crossings."""
-    geometry = mesh_of(_body().mesh)
+    geometry = worm_of(MAIN.config).geometry()
     holds = geometry.n_strands == 12 and geometry.n_crossings == 90
     return judged([holds]), {"geometry": geometry, "n_planes": len(geometry.plane_x_m)}
 
@@ -62,7 +56,7 @@ def mesh(evidence: Evidence) -> Judgement:
 @judges
 def strand_radius(evidence: Evidence) -> Judgement:
     """The strand's radius is that of a solid rod of the tube's cross-section."""
-    radius_m, equal_area_m = _body().strands.radius_m, sqrt(TUBE_AREA_M2 / pi)
+    radius_m, equal_area_m = worm_of(MAIN.config).strands.radius_m, sqrt(TUBE_AREA_M2 / pi)
     return near([radius_m], equal_area_m, ""), {
         "equal_area_mm": 1e3 * equal_area_m,
         "more": 100 * (equal_area_m / radius_m - 1),
@@ -74,7 +68,10 @@ def strand_radius(evidence: Evidence) -> Judgement:
 @judges
 def strand_mass(evidence: Evidence) -> Judgement:
     """The strand weighs what the tube does."""
-    tube, strand = TUBE_AREA_M2 * POLYETHYLENE_KG_PER_M3, _body().strands.one_number("linear_density_kg_per_m")
+    tube, strand = (
+        TUBE_AREA_M2 * POLYETHYLENE_KG_PER_M3,
+        worm_of(MAIN.config).strands.one_number("linear_density_kg_per_m"),
+    )
     return near([strand], tube, ""), {"tube_g_per_m": 1e3 * tube, "strand_g_per_m": 1e3 * strand}
 
 
@@ -129,7 +126,7 @@ def springs(evidence: Evidence) -> Judgement:
 @judges
 def muscle_function(evidence: Evidence) -> Judgement:
     """The engine's muscle is the closed form."""
-    difference = largest_difference(_body().muscles)
+    difference = largest_difference(worm_of(MAIN.config).muscles)
     return judged([difference < 1e-9]), {"difference": difference}
 
 
@@ -144,7 +141,7 @@ def activation(evidence: Evidence) -> Judgement:
 @judges
 def force(evidence: Evidence) -> Judgement:
     """The largest force of each run is the paper's."""
-    summaries, body = [one.summary for one, _ in evidence.runs], _body()
+    summaries, body = [one.summary for one, _ in evidence.runs], worm_of(MAIN.config)
     peaks = [summary.contraction_force_peak_N or nan for summary in summaries]
     return near(peaks, 2.5, "the run"), {
         "peaks": peaks,
@@ -156,7 +153,9 @@ def force(evidence: Evidence) -> Judgement:
 @judges
 def force_of_springs(evidence: Evidence) -> Judgement:
     """The force lies between those of both elongations."""
-    low_N, high_N = (6 * _body().springs.one_number("stiffness_N_per_m") * stretch for stretch in (0.02, 0.03))
+    low_N, high_N = (
+        6 * worm_of(MAIN.config).springs.one_number("stiffness_N_per_m") * stretch for stretch in (0.02, 0.03)
+    )
     return judged([low_N <= 2.5 <= high_N]), {"low_N": low_N, "high_N": high_N}
 
 

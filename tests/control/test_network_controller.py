@@ -12,7 +12,7 @@ import pytest
 import annelid
 from annelid.control import NetworkController, Sense
 from annelid.errors import ConfigError
-from annelid.nervous import Firing, GapJunction, ModulatorySynapse, Network, Neuron, SpikingSynapse, Synapse
+from annelid.nervous import GapJunction, Network, Neuron, Synapse
 from annelid.nervous import persistent_sodium as sodium
 
 N = 6
@@ -71,18 +71,18 @@ def test_a_stride_is_so_many_steps(rate_m_per_s: float) -> None:
 def test_currents_and_gates_are_recorded_by_name_and_add_up() -> None:
     """The rate of each potential times its capacitance is the sum of leak, bias and the currents that are recorded."""
     network = Network("all")
-    network.add_neuron("a", Neuron(8.0, bias_nA=14.0, firing=Firing(10.0, 0.0)))
+    network.add_neuron("a", Neuron(8.0, bias_nA=14.0))
     network.add_neuron("b", Neuron(9.0, 0.8, rest_mV=1.0), 3.0)
     network.add_neuron("c", Neuron(7.0, channels=(sodium(0.4),)), 4.0)
-    network.add_synapse("a", "b", SpikingSynapse(0.5, 60.0, 20.0))
+    network.add_synapse("a", "b", Synapse(0.5, 60.0))
     network.add_synapse("b", "a", Synapse(0.4, -40.0))
     network.add_synapse("b", "a", Synapse(0.2, 50.0, 1.0, 5.0))
     network.add_gap_junction("a", "b", GapJunction(0.1, rectified=True))
-    network.add_synapse("b", "c", ModulatorySynapse("gates", 2.0))
+    network.add_synapse("b", "c", Synapse(0.3, 50.0))
     network.add_output("b", "b")
     driven = NetworkController(network, {}, ["b"])
     names = driven.recordable().coords
-    assert names["connection"] == ["a -> b", "b -> a", "b -> a_2", "a -> b_2"]
+    assert names["connection"] == ["a -> b", "b -> a", "b -> a_2", "a -> b_2", "b -> c"]
     assert names["channel"] == ["c"]
     after = driven.read(False)
     for step in range(200):

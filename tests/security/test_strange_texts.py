@@ -15,8 +15,7 @@ from annelid import Network, simulate
 from annelid.config import load_config, load_study, parse_assignments
 from annelid.errors import AnnelidError, SimulationStopped
 from annelid.experiment.spread import read_spread
-from annelid.nervous import GapJunction, Gate, ModulatorySynapse, Neuron, SpikingSynapse, Synapse
-from annelid.nervous.neurons import Channel, Firing
+from annelid.nervous import Channel, GapJunction, Gate, Neuron, Synapse
 from annelid.textfiles import MOST_BYTES, parse_toml
 from annelid_lab.calibration.load_frame import read_loop
 from annelid_studies.robustness import read_judged
@@ -147,14 +146,10 @@ def test_a_network_takes_no_number_that_is_not_finite(number: float) -> None:
         lambda: Gate(number),
         lambda: Gate(1.0, power=number),
         lambda: Channel(1.0, number),
-        lambda: Firing(number),
-        lambda: Firing(adaptation=number),
         lambda: Synapse(number, 1.0),
         lambda: Synapse(1.0, number),
         lambda: Synapse(1.0, 1.0, saturation_mV=number),
         lambda: GapJunction(number),
-        lambda: SpikingSynapse(1.0, number),
-        lambda: ModulatorySynapse("leak", number),
         lambda: Network().add_neuron("n", Neuron(), number),
         lambda: Network.from_toml(f"[[neuron]]\nname = 'a'\nrest_mV = {number}"),
     ]

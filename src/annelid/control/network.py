@@ -10,7 +10,7 @@ import numpy as np
 
 from annelid.control.base import SENSED, ControllerCode, NeuralController
 from annelid.errors import ConfigError, require_positive, shown, suggest
-from annelid.nervous import GapJunction, ModulatorySynapse, Network, Scheme, SpikingSynapse
+from annelid.nervous import GapJunction, Network, Scheme
 from annelid.nervous.arrays import NO_GATE
 from annelid.protocols import Array, Sensation, Values
 from annelid.text import numbered
@@ -151,8 +151,7 @@ class NetworkController(NeuralController):
     def reset(self, seed: int) -> None:
         """Returns to the network's initial state; nothing here is random."""
         state = self._stepper.initial_state()
-        spiking = {"threshold": state.threshold, "release": state.release, "fired": state.fired}
-        self._start_at(state, n_steps=np.array(0), **{name: each for name, each in spiking.items() if each.size})
+        self._start_at(state, n_steps=np.array(0))
 
     def stride(self, sensation: Sensation, n_steps: int) -> Array:
         """Advances by control steps, as `annelid.protocols.StridingController.stride`.
@@ -247,15 +246,8 @@ class NetworkController(NeuralController):
         if self._gates:
             values["gate"] = np.array([state.gate[0, slot, channel] for slot, channel in self._gates])
         if self._currents.labels:
-            values["synaptic_current"] = self._currents.read(state.potential[0], self._release())
+            values["synaptic_current"] = self._currents.read(state.potential[0])
         return values
-
-    def _release(self) -> Array:
-        """Release of every spiking synapse, in the order of the connections."""
-        arrays, firing = self._stepper.arrays, list(self._stepper.arrays.firing_neuron)
-        keys = zip(arrays.release_source, arrays.release_time_constant_ms, arrays.release_increment, strict=True)
-        places = {(firing[source], tau, increment): place for place, (source, tau, increment) in enumerate(keys)}
-        return self._state.release[0, [places[key] for key in self._currents.release_keys]]
 
     def _coords(self) -> dict[str, list[int] | list[str]]:
         arrays = self._stepper.arrays
@@ -269,36 +261,24 @@ class NetworkController(NeuralController):
 
 
 class _Currents:
-    """The currents of all connections that carry one, from potentials and releases."""
+    """The currents of all connections, from potentials."""
 
     def __init__(self, network: Network) -> None:
         place = {name: number for number, name in enumerate(network.neurons)}
-        kinds = {
-            (number, place[c.source], place[c.target]): c.kind
-            for number, c in enumerate(network.connections)
-            if not isinstance(c.kind, ModulatorySynapse)
-        }
-        ends = (network.connections[number] for number, _, _ in kinds)
-        self.labels = numbered(f"{c.source} -> {c.target}" for c in ends)
-        _, self._source, self._target = np.array(list(kinds), dtype=np.intp).reshape(-1, 3).T
-        self.release_keys = [
-            (source, kind.time_constant_ms, kind.increment)
-            for (_, source, _), kind in kinds.items()
-            if isinstance(kind, SpikingSynapse)
-        ]
-        kinds = list(kinds.values())
+        self.labels = numbered(f"{c.source} -> {c.target}" for c in network.connections)
+        self._source = np.array([place[c.source] for c in network.connections], dtype=np.intp)
+        self._target = np.array([place[c.target] for c in network.connections], dtype=np.intp)
+        kinds = [c.kind for c in network.connections]
         self._conductance = np.array([kind.conductance_uS for kind in kinds])
         self._reversal = np.array([getattr(kind, "reversal_mV", np.nan) for kind in kinds])
         self._threshold = np.array([getattr(kind, "threshold_mV", 0.0) for kind in kinds])
         self._slope = 1.0 / (np.array([getattr(kind, "saturation_mV", 1.0) for kind in kinds]) - self._threshold)
-        self._spiking = np.array([isinstance(kind, SpikingSynapse) for kind in kinds], dtype=bool)
         self._junction = np.array([isinstance(kind, GapJunction) for kind in kinds], dtype=bool)
         self._rectified = np.array([getattr(kind, "rectified", False) for kind in kinds], dtype=bool)
 
-    def read(self, potential: Array, release: Array) -> Array:
+    def read(self, potential: Array) -> Array:
         """Returns the current of each into its target, nA."""
         before, after = potential[self._source], potential[self._target]
         opening = np.clip((before - self._threshold) * self._slope, 0.0, 1.0)
-        opening[self._spiking] = release
         flow = np.where(self._rectified, np.maximum(before - after, 0.0), before - after)
         return self._conductance * np.where(self._junction, flow, opening * (self._reversal - after))

@@ -11,7 +11,7 @@ from pathlib import Path
 from annelid.errors import ConfigError
 from annelid.nervous.drawing import COLORS, Shape, Words, effect_of, frame_of, network_shapes, strength_of
 from annelid.nervous.key import key_shapes
-from annelid.nervous.neurons import GapJunction, ModulatorySynapse, Neuron, SpikingSynapse, Synapse
+from annelid.nervous.neurons import GapJunction, Neuron, Synapse
 from annelid.nervous.wiring import Wiring
 from annelid.text import printable
 
@@ -19,7 +19,6 @@ from annelid.text import printable
 _EDGES = {
     "excitatory": "arrowhead=empty",
     "inhibitory": "arrowhead=dot",
-    "modulatory": "arrowhead=box, style=dotted",
     "gap junction": "arrowhead=none, style=dashed",
     "rectified gap junction": "arrowhead=diamond, style=dashed",
 }
@@ -65,10 +64,9 @@ class Diagram:
 def draw_diagram(network: Wiring, *, details: bool = True) -> Diagram:
     """Draws a network.
 
-    Open triangles excite, filled dots inhibit, dashed lines to open squares modulate; gap junctions are resistors,
-    rectified ones end in a diode. Spiking neurons are octagons, neurons with gated channels have a double rim. A key
-    below the network says so, and what abbreviated names stand for. `annelid.draw.network_figure` draws the same as
-    PNG, PDF or SVG.
+    Open triangles excite, filled dots inhibit; gap junctions are resistors, rectified ones end in a diode. Neurons with
+    gated channels have a double rim. A key below the network says so, and what abbreviated names stand for.
+    `annelid.draw.network_figure` draws the same as PNG, PDF or SVG.
 
     Args:
         network: The network.
@@ -106,22 +104,13 @@ def _specials(neuron: Neuron) -> str:
         + "".join(f", tau {gate.time_constant_ms:g} ms" for gate in channel.slow_gates)
         for channel in neuron.channels
     ]
-    if neuron.firing is not None:
-        words.append(f"fires at {neuron.firing.threshold_mV:g} mV, reset to {neuron.firing.reset_mV:g} mV")
-        if neuron.firing.adaptation:
-            words[-1] += f", adaptation {neuron.firing.adaptation:g}"
     return "; ".join(words)
 
 
-def _connection_cells(kind: Synapse | GapJunction | SpikingSynapse | ModulatorySynapse) -> tuple[str, str, str]:
+def _connection_cells(kind: Synapse | GapJunction) -> tuple[str, str, str]:
     if isinstance(kind, GapJunction):
         return f"{kind.conductance_uS:.6g}", "", ""
-    if isinstance(kind, SpikingSynapse):
-        words = f"tau {kind.time_constant_ms:g} ms, increment {kind.increment:g}"
-        return f"{kind.conductance_uS:.6g}", f"{kind.reversal_mV:g}", words
     reach = f"{kind.threshold_mV:g} to {kind.saturation_mV:g} mV"
-    if isinstance(kind, ModulatorySynapse):
-        return "", "", f"{kind.quantity} × {kind.factor:g}, {reach}"
     return f"{kind.conductance_uS:.6g}", f"{kind.reversal_mV:g}", reach
 
 
@@ -145,9 +134,8 @@ def _graphviz(network: Wiring) -> Iterator[str]:
     yield "  edge [fontsize=8];"
     keys = {name: f"n{number}" for number, name in enumerate(network.neurons)}
     for name, neuron in network.neurons.items():
-        shape = "octagon" if neuron.firing is not None else "circle"
         rims = 2 if neuron.channels else 1
-        yield f"  {keys[name]} [label={_quoted(name)}, shape={shape}, peripheries={rims}];"
+        yield f"  {keys[name]} [label={_quoted(name)}, peripheries={rims}];"
     for connection in network.connections:
         effect = effect_of(network, connection)
         yield (

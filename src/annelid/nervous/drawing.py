@@ -15,7 +15,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.nervous.neurons import GapJunction, ModulatorySynapse
+from annelid.nervous.neurons import GapJunction
 from annelid.nervous.wiring import Connection, Wiring
 
 Points = NDArray[np.complexfloating]
@@ -27,13 +27,12 @@ _COLUMN_GAP = 1.35
 _CROWDED = 0.4
 _BENDS = (0.0, 0.2, -0.2, 0.35, -0.35, 0.55, -0.55, 0.8, -0.8)
 _NUMBERED = re.compile(r"(.+)_(\d{1,9})")
-Effect = Literal["excitatory", "inhibitory", "modulatory", "gap junction", "rectified gap junction"]
+Effect = Literal["excitatory", "inhibitory", "gap junction", "rectified gap junction"]
 _GREY = "#595959"
 # Dark and light in grey, hues far apart for colour-blind eyes.
 COLORS: dict[Effect, str] = {
     "excitatory": "#c2410c",
     "inhibitory": "#1b2a6b",
-    "modulatory": _GREY,
     "gap junction": _GREY,
     "rectified gap junction": _GREY,
 }
@@ -78,17 +77,12 @@ def effect_of(network: Wiring, connection: Connection) -> Effect:
     kind = connection.kind
     if isinstance(kind, GapJunction):
         return "rectified gap junction" if kind.rectified else "gap junction"
-    if isinstance(kind, ModulatorySynapse):
-        return "modulatory"
     return "excitatory" if kind.reversal_mV > network.neurons[connection.target].rest_mV else "inhibitory"
 
 
 def strength_of(connection: Connection) -> str:
-    """Returns the words beside a connection: conductance, or what is modulated by which factor."""
-    kind = connection.kind
-    if isinstance(kind, ModulatorySynapse):
-        return f"{kind.quantity} × {kind.factor:.3g}"
-    return f"{kind.conductance_uS:.3g} uS"
+    """Returns the words beside a connection, its conductance."""
+    return f"{connection.kind.conductance_uS:.3g} uS"
 
 
 def network_shapes(network: Wiring, *, strengths: bool) -> list[Shape]:
@@ -116,9 +110,8 @@ def network_shapes(network: Wiring, *, strengths: bool) -> list[Shape]:
     for stub in layout.outputs:
         front += [*arrow_shapes(stub.rim, stub.outer, f"output-{stub.name}"), *_name_of(stub)]
     for name, place in layout.places.items():
-        neuron = network.neurons[name]
-        spiking, gated = neuron.firing is not None, bool(neuron.channels)
-        front += neuron_shapes(place, labels[name], spiking=spiking, gated=gated, key=f"neuron-{name}")
+        gated = bool(network.neurons[name].channels)
+        front += neuron_shapes(place, labels[name], gated=gated, key=f"neuron-{name}")
     return [*columns, *paths, *marks, *numbers, *front]
 
 
@@ -131,18 +124,17 @@ def _beside(route: Points, share: float, text: str) -> Words:
     return Words(text, place + 0.05 * normal, 7.0, "left" if normal.real > 0.0 else "right", halo=True)
 
 
-def neuron_shapes(place: complex, label: str, *, spiking: bool, gated: bool, key: str = "") -> list[Shape]:
-    """Draws a circle, or an octagon for a neuron that spikes, with a double rim if it has gated channels."""
+def neuron_shapes(place: complex, label: str, *, gated: bool, key: str = "") -> list[Shape]:
+    """Draws a circle, with a double rim for a neuron that has gated channels."""
     size_pt = 9.0 if len(label) <= 3 else min(7.0, max(5.0, 65.0 / len(label)))
-    n_corners = 8 if spiking else _ROUND
-    rims: list[Shape] = [Line(_polygon(place, RADIUS, n_corners), "black", 1.3, "white", key=key)]
+    rims: list[Shape] = [Line(_polygon(place, RADIUS, _ROUND), "black", 1.3, "white", key=key)]
     if gated:
-        rims.append(Line(_polygon(place, 0.84 * RADIUS, n_corners), "black", 0.8, "white"))
+        rims.append(Line(_polygon(place, 0.84 * RADIUS, _ROUND), "black", 0.8, "white"))
     return [*rims, Words(label, place, size_pt)]
 
 
 def connection_shapes(route: Points, effect: Effect, key: str = "") -> list[Shape]:
-    """Draws a path that ends in a triangle, a dot or a square, or has a resistor in its middle."""
+    """Draws a path that ends in a triangle or a dot, or has a resistor in its middle."""
     color, along = COLORS[effect], arc_length(route)
     if "gap" in effect:
         path = Line(with_resistor(route), color, key=key)
@@ -162,12 +154,9 @@ def connection_shapes(route: Points, effect: Effect, key: str = "") -> list[Shap
     back, middle = tip - length * forward, tip - _DOT * forward
     if effect == "inhibitory":
         mark = Line(_polygon(middle, _DOT, _ROUND), color, 1.0, color)
-    elif effect == "excitatory":
-        mark = _triangle(tip, back, 0.5j * length * forward, color, 1.2, "white")
     else:
-        across = 1j * _DOT * forward
-        mark = Line(np.array([tip, middle + across, back, middle - across]), color, 1.2, "white")
-    return [Line(body, color, dashed=effect == "modulatory", key=key), mark]
+        mark = _triangle(tip, back, 0.5j * length * forward, color, 1.2, "white")
+    return [Line(body, color, key=key), mark]
 
 
 def arrow_shapes(tail: complex, head: complex, key: str = "") -> list[Shape]:

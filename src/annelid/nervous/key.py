@@ -49,9 +49,8 @@ def _key(network: Wiring) -> list[str]:
     """What the key has to explain: only what the network has."""
     effects = {effect_of(network, link) for link in network.connections}
     neurons = network.neurons.values()
-    key = ["neuron"] * any(not neuron.channels and neuron.firing is None for neuron in neurons)
+    key = ["neuron"] * any(not neuron.channels for neuron in neurons)
     key += ["neuron with gated channels"] * any(neuron.channels for neuron in neurons)
-    key += ["spiking neuron"] * any(neuron.firing is not None for neuron in neurons)
     key += [what if "gap" in what else f"{what} synapse" for what in COLORS if what in effects]
     return key + ["input current"] * bool(network.inputs) + ["output: potential read"] * bool(network.outputs)
 
@@ -70,7 +69,7 @@ def _key_shapes(entries: Sequence[str], meanings: Sequence[str]) -> tuple[list[S
         if what in COLORS:
             shapes += connection_shapes(path, what)
         elif "neuron" in entry:
-            shapes += neuron_shapes(path.mean(), "", spiking="spiking" in entry, gated="gated" in entry)
+            shapes += neuron_shapes(path.mean(), "", gated="gated" in entry)
         else:
             shapes += arrow_shapes(path[0], path[-1])
             rim = path[-1 if entry.startswith("input") else 0]

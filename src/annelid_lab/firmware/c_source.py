@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from annelid.control import SENSED, ControllerCode
 from annelid.errors import ConfigError, RunFileError
-from annelid.nervous import NO_GATE, Factors, Network, NetworkState, Scheme
+from annelid.nervous import NO_GATE, Network, NetworkState, Scheme
 from annelid.output import write_text
 from annelid.text import numbered
 
@@ -202,35 +202,9 @@ class Writer:
         if slow:
             rates = [stepper.gate_rate[slot, 0, channel] for slot, channel in slow]
             self._table("gate_rate", np.array(rates), "step over time constant of the slow gates")
-        factors = {
-            "gate_factors": self._gate_factors(slow),
-            "channel_factors": _pairs(stepper.channel_factors),
-            "leak_factors": _pairs(stepper.leak_factors),
-            "membrane_factors": _pairs(stepper.membrane_factors),
-        }
-        if a.modulated:
-            self._sparse("modulation", a.log_modulation.T, "terminal", {"log": a.log_modulation.T})
-        for name, pairs_of in factors.items():
-            if len(pairs_of):
-                self._table(name[:-1], pairs_of, "what is modulated, and the column of its factor")
-        if len(factors["leak_factors"]):
-            modulated = factors["leak_factors"][:, 0]
-            self._table("leak_step", stepper.leak_step[modulated], "leak times step over capacitance")
-            self._table("leak_rest", a.rest_mV[modulated])
         if len(a.rectified_source):
             self._table("rectified_source", a.rectified_source, "higher sides of rectified gap junctions")
             self._table("rectified_target", a.rectified_target)
-        if len(a.firing_neuron):
-            self._table("firing_neuron", a.firing_neuron, "neurons that spike")
-            self._table("firing_rest", a.rest_mV[a.firing_neuron])
-            self._table("threshold_rate", stepper.threshold_rate, "step over time constant of the thresholds")
-            self._table("threshold_start", a.threshold_mV)
-            self._table("adaptation", a.adaptation)
-            self._table("reset", a.reset_mV, "potentials after a spike")
-        if len(a.release_source):
-            self._table("release_source", a.release_source, "which of these makes each release")
-            self._table("release_decay", stepper.release_decay)
-            self._table("release_increment", a.release_increment)
         is_sparse = self._weights(stepper.weights, n)
         raised = "raised(%s, gate_power[i])" if whole else "POW(%s, gate_power[i])"
         slow_power, instant_power = "gate[i]", "1 / gate_sum[i]"
@@ -243,11 +217,7 @@ class Writer:
             "n_channels": n_channels,
             "n_gates": len(gates),
             "n_slow": len(slow),
-            "n_modulated": len(a.modulated),
             "n_rectified": len(a.rectified_source),
-            "n_firing": len(a.firing_neuron),
-            "n_releases": len(a.release_source),
-            **{f"n_{name}": len(pairs_of) for name, pairs_of in factors.items()},
         }
         flags = {
             "terminals": n_terminals,
@@ -257,18 +227,14 @@ class Writer:
             "heun": stepper.scheme == "heun",
             "toolbox": stepper.scheme == "toolbox",
             "gates_last": slow and stepper.scheme != "toolbox",
-            "modulated": a.modulated,
             "raised": not plain and whole,
             "nothing_seen": not n_terminals and not gates,
             "pairs": pairs,
             "products": n_channels and not pairs,
             "rectified": len(a.rectified_source),
             "potentials": a.drive["potentials"].stop > at["potentials"],
-            "firing": len(a.firing_neuron),
-            "releases": len(a.release_source),
             "sparse": is_sparse,
             "dense": not is_sparse,
-            **{name: len(pairs_of) for name, pairs_of in factors.items()},
         }
         drive_words = ", ".join(kind for kind, part in a.drive.items() if part.stop > part.start)
         return {
@@ -287,12 +253,6 @@ class Writer:
             f"{'sparse' if is_sparse else 'dense'} table.",
         }
 
-    def _gate_factors(self, slow: Sequence[tuple[int, int]]) -> NDArray[np.intp]:
-        """Slow gates that are modulated, each with the column of its factor."""
-        column = dict(_pairs(self._stepper.gate_factors).tolist())
-        found = [(place, column[channel]) for place, (_, channel) in enumerate(slow) if channel in column]
-        return np.array(found, dtype=np.intp).reshape(-1, 2)
-
     def _weights(self, weights: NDArray[np.float64], n: int) -> bool:
         """Writes the weights in the smaller form, and returns whether that is the sparse one."""
         conductance, current = weights[:, :n].T, weights[:, n:].T
@@ -301,22 +261,17 @@ class Writer:
         index = _index_type(max(len(weights), int(used.sum())))[1]
         is_sparse = int(used.sum()) * (2 * number + index) + (n + 1) * index < weights.size * number
         if is_sparse:
-            self._sparse("drive", used, "source", {"conductance": conductance, "current": current})
+            # The entries of each neuron that are used, one neuron after the other.
+            neurons, sources = np.nonzero(used)
+            first = np.searchsorted(neurons, np.arange(n + 1))
+            self._table("drive_first", first, "where the entries of each neuron begin")
+            self._table("drive_source", sources)
+            self._table("drive_conductance", conductance[used], "times dt / C")
+            self._table("drive_current", current[used], "times dt / C")
         else:
             self._table("drive_conductance", conductance, "dt / C times conductances, by neuron and drive")
             self._table("drive_current", current, "dt / C times currents")
         return is_sparse
-
-    def _sparse(self, name: str, used: NDArray[Any], column: str, values: Mapping[str, NDArray[Any]]) -> None:
-        """Writes the entries of each row that are used, one row after the other."""
-        rows, columns = np.nonzero(used)
-        first = np.searchsorted(rows, np.arange(len(used) + 1))
-        self._table(
-            f"{name}_first", first, f"where the entries of each {'neuron' if name == 'drive' else 'factor'} begin"
-        )
-        self._table(f"{name}_{column}", columns)
-        for value, dense in values.items():
-            self._table(f"{name}_{value}", dense[rows, columns], "times dt / C" if name == "drive" else "")
 
     def _table(self, name: str, values: ArrayLike, meaning: str = "") -> None:
         array = np.asarray(values)
@@ -380,10 +335,6 @@ class Writer:
         if self._gates and self._stepper.arrays.n_slow:
             slow = [(slot, channel) for slot, channel in self._gates if slot < a.n_slow]
             parts.append(("gate", np.array([self._start.gate[0, slot, channel] for slot, channel in slow])))
-        if len(a.firing_neuron):
-            parts += [("threshold_mV", self._start.threshold[0]), ("fired", self._start.fired[0].astype(int))]
-        if len(a.release_source):
-            parts.append(("release", self._start.release[0]))
         start = [f"    {self._values(value)}, /* {label} */" for label, value in [*parts, *state.items()]]
         constants = []
         for label, value in code.constants.items():
@@ -455,10 +406,6 @@ def _lengths(value: ArrayLike) -> str:
     return "".join(f"[{length}]" for length in np.shape(value))
 
 
-def _pairs(factors: Factors) -> NDArray[np.intp]:
-    return np.stack(factors, axis=1)
-
-
 def _index_type(most: int) -> tuple[str, int]:
     """The smallest type of a place, and its bytes."""
     return next(
@@ -473,8 +420,6 @@ def _of_neuron(network: Network, name: str) -> str:
         kinds.append(f"bias {neuron.bias_nA:g} nA")
     if neuron.channels:
         kinds.append(f"{len(neuron.channels)} gated channel{'s' if len(neuron.channels) > 1 else ''}")
-    if neuron.firing is not None:
-        kinds.append("spikes")
     return ", ".join(kinds)
 
 

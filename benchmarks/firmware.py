@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 import annelid
-from annelid.control.base import SENSED
+from annelid.control import SENSED
 from annelid.nervous import (
     Channel,
     GapJunction,

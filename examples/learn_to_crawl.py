@@ -2,7 +2,7 @@
 
 At first it contracts all over at once and stays where it is. Takes minutes on two cores.
 
-    pip install 'annelid[gym,tune]' && python examples/learn_to_crawl.py [folder]
+    pip install 'annelid[gym]' cmaes && python examples/learn_to_crawl.py [folder]
 """
 
 import sys

@@ -17,7 +17,7 @@ from annelid.errors import AnnelidError, SimulationStopped
 from annelid.experiment.spread import read_spread
 from annelid.nervous import Channel, GapJunction, Gate, Neuron, Synapse
 from annelid.textfiles import MOST_BYTES, parse_toml
-from annelid_lab.calibration.load_frame import read_loop
+from annelid_lab.calibration import read_loop
 from annelid_studies.robustness import read_judged
 
 LONGEST_S = 20.0

@@ -124,9 +124,9 @@ def tune_command(
 ) -> None:
     """Search for a faster, cheaper or less slipping gait.
 
-    An optimiser (CMA-ES for one objective, a tree-structured Parzen estimator for two or where there are choices)
-    varies fields of controller and body. Every run is judged over its complete cycles; one that stops, falls silent or
-    out of order, or does not advance counts as no speed, a cost of transport of 100 and a slip ratio of 10.
+    An optimiser (a tree-structured Parzen estimator) varies fields of controller and body. Every run is judged over its
+    complete cycles; one that stops, falls silent or out of order, or does not advance counts as no speed, a cost of
+    transport of 100 and a slip ratio of 10.
 
     Writes after every generation: best.toml, which `annelid run` takes; trials.csv; tuning.png and .svg; with two
     objectives also front/, a file for each gait of the Pareto front. Runs are kept, so that a second call, also one

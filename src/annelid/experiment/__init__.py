@@ -21,14 +21,13 @@ if TYPE_CHECKING:
     from annelid.experiment.check import Check, check, compare, finer_steps, more_elements, refinements
     from annelid.experiment.executors import Processes, answers, end_after
     from annelid.experiment.fingerprint import code_fingerprint, physics_fingerprint, room_of
+    from annelid.experiment.judge import Judged, judge, numerical_problem
     from annelid.experiment.outcome import Hold, Outcome
     from annelid.experiment.progress import StudyProgress, study_progress
     from annelid.experiment.store import Store, case_key
-    from annelid.experiment.tune import START, Judged, judge, numerical_problem
 
 __all__ = [
     "SHEAR_OVER_YOUNG",
-    "START",
     "Case",
     "Check",
     "Hold",
@@ -54,4 +53,4 @@ __all__ = [
     "write_worm",
 ]
 
-__getattr__, __dir__ = lazy(__name__)
+__getattr__, __dir__ = lazy(__name__, {"START": "the first trial of a search is the start"})

@@ -85,15 +85,8 @@ def _variable(vary: Vary, base: RunConfig) -> Variable:
     return Interval(field, low, high, vary.log, whole)
 
 
-def to_unit(variable: Interval, value: float) -> float:
-    """Returns where a value lies in its range: 0 at the lower end, 1 at the upper one."""
-    if variable.logarithmic:
-        return log(value / variable.low) / log(variable.high / variable.low)
-    return (value - variable.low) / (variable.high - variable.low)
-
-
 def from_unit(variable: Interval, share: float) -> float | int:
-    """Returns the value at a place of its range, rounded as the variable is; the inverse of `to_unit` but for that."""
+    """Returns the value at a place of its range, 0 at the lower end and 1 at the upper one, rounded as the variable."""
     if variable.logarithmic:
         return variable.rounded(variable.low * exp(share * log(variable.high / variable.low)))
     return variable.rounded(variable.low + share * (variable.high - variable.low))

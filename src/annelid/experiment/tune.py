@@ -1,40 +1,37 @@
 """Tuning a gait: fields of controller and body in ranges or among choices, by speed, cost of transport or slip.
 
-An optimiser asks for generations of gaits, and the store of runs computes them. A search leaves its trials as CSV, its
-best gaits as files that run, a table and a figure.
+Optuna asks for generations of gaits, and the store of runs computes them. A search leaves its trials as CSV, its best
+gaits as files that run, a table and a figure.
 """
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from math import isfinite
+from math import floor, isfinite, log, nan
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.table import Table
 
-from annelid.analysis.gait import Gait
 from annelid.config import RunConfig, Vary, field_value, fields_of, load_config, parse_assignments, toml_value
 from annelid.config.checking import check_section
-from annelid.draw.figures.experiments import Mark, pareto_figure, progress_figure
-from annelid.errors import ConfigError, suggest
+from annelid.draw.figures.experiments import pareto_figure, progress_figure
+from annelid.errors import ConfigError, MissingDependency, suggest
 from annelid.experiment.case import Case, write_worm
-from annelid.experiment.optimisers import optimiser_of
-from annelid.experiment.outcome import Outcome
+from annelid.experiment.judge import Judged, judge
 from annelid.experiment.space import Choice, Variable, variables_of
-from annelid.experiment.store import Done, Store, case_key
+from annelid.experiment.store import Done, Store
 from annelid.output import write_csv
 
-LEAST_WORK_J = 0.01
-"""Muscles that do less work leave the worm where it lies, and a share of their work says nothing."""
-START = -1
-"""Number of the gait that the search starts from, which is no trial."""
+if TYPE_CHECKING:
+    import optuna
+
 HOW = "give FIELD=LOW:HIGH, FIELD=LOW:HIGH:log or FIELD=VALUE,VALUE,.."
-LEAST_CYCLES = 2
-"""Complete cycles that a gait must have."""
 HISTORY, BEST, FRONT, FIGURE = "trials.csv", "best.toml", "front", "tuning"
+"""What is in the folder of the results."""
 _ROWS = {
     "speed (m/s)": "speed_m_per_s",
     "body lengths/s": "speed_body_lengths_per_s",
@@ -42,7 +39,7 @@ _ROWS = {
     "the same, net work": "cost_of_transport_net",
     "the same, cables": "cost_of_transport_cables",
     "slip ratio": "slip_ratio",
-    "period (s)": "period_s",
+    "period (s)": "gait_period_s",
     "cycles": "cycles",
 }
 MOST_SHOWN = 8
@@ -60,6 +57,11 @@ class Objective:
     penalty: float
     """What counts for a run that does not walk."""
 
+    def value(self, judged: Judged) -> float:
+        """Returns its value for a run: the penalty where that does not walk."""
+        value = None if judged.gait is None or judged.problem else getattr(judged.gait, self.number)
+        return self.penalty if value is None or not isfinite(value) else value
+
 
 OBJECTIVES: Mapping[str, Objective] = {
     one.name: one
@@ -73,25 +75,6 @@ OBJECTIVES: Mapping[str, Objective] = {
 gait that advances: no speed, and a cost and a slip beyond reach."""
 
 
-@dataclass(frozen=True, slots=True)
-class Judged:
-    """What was found of one run."""
-
-    gait: Gait | None
-    """Its numbers; None where it was stopped or could not be computed."""
-    problem: str
-    """Why it does not count as a gait; empty if it does."""
-
-    def value(self, objective: Objective) -> float:
-        """Returns the value of an objective, its penalty for a run that does not walk."""
-        value = None if self.gait is None or self.problem else getattr(self.gait, objective.number)
-        return objective.penalty if value is None or not isfinite(value) else value
-
-    def score(self, objective: Objective) -> float:
-        """Returns the value of an objective, signed so that less is better."""
-        return -self.value(objective) if objective.more_is_better else self.value(objective)
-
-
 def objectives_of(names: list[str]) -> list[Objective]:
     """Returns one or two objectives by name."""
     for name in names:
@@ -100,50 +83,6 @@ def objectives_of(names: list[str]) -> list[Objective]:
     if not 1 <= len(set(names)) == len(names) <= 2:
         raise ConfigError(f"objectives must be one or two of {', '.join(OBJECTIVES)}, not {', '.join(names)}")
     return [OBJECTIVES[name] for name in names]
-
-
-def judge(outcome: Outcome, numerics: float | None = None) -> Judged:
-    """Judges a run: it must have ended whole, in order, over at least two cycles, and advance.
-
-    In order are neighbours that take turns with steady periods and lags; onsets need not be evenly spaced.
-
-    Args:
-        outcome: Of the run.
-        numerics: Largest share of the muscles' work that the integrator may take or add; None for any.
-    """
-    problem = _problem(outcome)
-    if not problem and numerics is not None:
-        problem = numerical_problem(outcome, numerics)
-    return Judged(None if outcome.message else outcome.gait, problem)
-
-
-def numerical_problem(outcome: Outcome, largest_share: float) -> str:
-    """Says if the integrator took or added more of the muscles' work than it may; nothing if it did not.
-
-    Args:
-        outcome: Of the run.
-        largest_share: How much of that work it may take or add; below 1.
-    """
-    energy = outcome.gait.energy
-    share = None if energy is None or energy.muscle_work_J < LEAST_WORK_J else energy.numerical_share
-    if share is None or abs(share) <= largest_share:
-        return ""
-    return f"the integrator {'took' if share > 0 else 'added'} {abs(share):.0%} of the muscles' work"
-
-
-def _problem(outcome: Outcome) -> str:
-    rhythm, gait = outcome.rhythm, outcome.gait
-    if outcome.message:
-        return f"stopped: {outcome.message}"
-    if rhythm.verdict == "silent":
-        return f"silent: {rhythm.reason}"
-    if not rhythm.is_regular:
-        return f"out of order: {rhythm.reason}"
-    if gait.cycles < LEAST_CYCLES:
-        return f"fewer than {LEAST_CYCLES} complete cycles"
-    if gait.speed_m_per_s is None or not gait.speed_m_per_s > 0.0:
-        return "does not advance"
-    return ""
 
 
 def parsed_variables(texts: Sequence[str], config: RunConfig) -> list[Variable]:
@@ -204,93 +143,167 @@ class Task:
         """The run that the search starts from."""
         return Case(self.source, self.changes)
 
+    @property
+    def title(self) -> str:
+        """The worm, and what it is tuned for."""
+        words = " and ".join(one.name.replace("-", " ") for one in self.objectives)
+        return f"{self.start.config.name}, tuned for {words}"
+
 
 @dataclass(frozen=True)
 class Trial:
-    """One run of a search."""
+    """One run of a search.
 
-    number: int
-    """From 0; `START` for the gait that the search starts from."""
+    Attributes:
+        name: Its number from 0; ``start`` for the gait that the search starts from.
+        values: Of the variables, by field.
+        case: The run.
+        judged: What was found of it.
+        path: Folder of the run.
+        failed: Whether it could not be computed, though it could be built.
+    """
+
+    name: str
     values: Mapping[str, Any]
-    """Of the variables, by field."""
     case: Case
     judged: Judged
     path: Path = field(compare=False)
-    """Folder of the run."""
     failed: bool = False
-    """Whether it could not be computed, though it could be built."""
+
+    def scores(self, objectives: Sequence[Objective]) -> list[float]:
+        """Returns the values of objectives."""
+        return [one.value(self.judged) for one in objectives]
+
+    @property
+    def numbers(self) -> list[str]:
+        """The numbers of its gait, each empty where there is none."""
+        found = (getattr(self.judged.gait, name, None) for name in _ROWS.values())
+        return ["" if number is None else f"{number:.4g}" for number in found]
+
+    def settings(self, task: Task) -> list[str]:
+        """Returns the values of the varied fields; of the start, those of its configuration."""
+        fields = [one.field for one in task.variables]
+        values = [self.values[one] if self.values else field_value(self.case.config, one) for one in fields]
+        return [toml_value(value).strip('"') for value in values]
 
 
 def search(task: Task, store: Store) -> Iterator[list[Trial]]:
     """Searches, and yields the trials generation by generation; first the start alone.
 
-    One objective over numbers is searched by CMA-ES, which starts at the source's own values if they lie in the ranges;
-    two objectives, or choices among the variables, by a tree-structured Parzen estimator. Generations are asked for and
-    scored in the order of their numbers, so that the search depends on its seed and not on the number of processes:
-    called again it asks for the same gaits, finds those in the store that it has computed, and goes on.
+    The optimiser is Optuna's multivariate tree-structured Parzen estimator (Bergstra 2011). It knows the start if that
+    lies in the ranges. Generations are asked for and scored in the order of their numbers, so that the search depends
+    on its seed and not on the number of processes: called again it asks for the same gaits, finds those in the store
+    that it has computed, and goes on.
 
     A run that cannot be built, stops, falls silent or out of order, or does not advance counts as a trial with the
     objectives' penalties; the run that it starts from must be one that can be built and written.
     """
+    study, start = _study(task), task.start
     found: list[Trial] = []
 
-    def report(stage: str, done: int, _: int, __: float) -> None:
-        done += max(len(found) - 1, 0)
-        store.progress(stage, done, task.n_trials, done / task.n_trials)
+    def finish(cases: Sequence[Case], stage: str) -> list[Done]:
+        before = max(len(found) - 1, 0)
+        return store.finish(
+            cases,
+            stage,
+            progress=lambda words, done, *_: store.progress(
+                words, before + done, task.n_trials, (before + done) / task.n_trials
+            ),
+        )
 
-    start = task.start
+    [done] = finish([start], "the gait it starts from")
+    if done.error is not None:
+        raise done.error
+    found.append(_trial("start", {}, start, done, task))
+    ranges = {one.field: _range(one) for one in task.variables}
     own = {one.field: field_value(start.config, one.field) for one in task.variables}
-    inside = all(own[one.field] in one for one in task.variables)
-    optimiser = optimiser_of(task.variables, len(task.objectives), own if inside else None, task.seed)
-    generation = next(optimiser)
-    outcomes = store.compute([start], "the gait it starts from", progress=report)
-    found.append(_trial(START, {}, start, Done(outcomes[case_key(start)]), task.numerics))
+    if all(own[one.field] in one for one in task.variables):
+        known = {one.field: _place(one, own[one.field]) for one in task.variables}
+        study.add_trial(
+            _optuna().trial.create_trial(params=known, distributions=ranges, values=found[0].scores(task.objectives))
+        )
     yield list(found)
-    while (done := len(found) - 1) < task.n_trials:
-        values = generation[: task.n_trials - done]
+    while (n := len(found) - 1) < task.n_trials:
+        asked = [study.ask(ranges) for _ in range(min(generation_size(task), task.n_trials - n))]
+        values = [{one.field: _value(one, trial.params[one.field]) for one in task.variables} for trial in asked]
         cases = [start.but(of_trial) for of_trial in values]
-        leaders = {objective: leader(found, [objective]) for objective in task.objectives}
-        words = [f"{one.name} {best.judged.value(one):.3g}" for one, best in leaders.items() if best is not None]
-        stage = f"tuning, best so far {', '.join(words)}" if words else "tuning, no gait so far"
-        results = store.finish(cases, stage, progress=report)
-        of_trials = enumerate(zip(values, cases, results, strict=True))
-        trials = [_trial(done + i, *of_it, task.numerics) for i, of_it in of_trials]
+        of_runs = zip(values, cases, finish(cases, _stage(task, found)), strict=True)
+        trials = [_trial(str(n + i), *of_run, task) for i, of_run in enumerate(of_runs)]
+        for theirs, ours in zip(asked, trials, strict=True):
+            study.tell(theirs, ours.scores(task.objectives))
         found += trials
         yield trials
-        if len(trials) == len(generation):
-            generation = optimiser.send([_scores(trial, task.objectives) for trial in trials])
 
 
-def _trial(number: int, values: Mapping[str, Any], case: Case, done: Done, numerics: float | None) -> Trial:
+def generation_size(task: Task) -> int:
+    """Returns how many gaits are asked for at once: more for more variables, an even number, at least 8."""
+    return max(8, 2 * floor((5 + 3 * log(len(task.variables))) / 2))
+
+
+def _optuna() -> Any:
+    try:
+        import optuna
+    except ImportError:
+        raise MissingDependency("tuning needs Optuna: install it with  pip install 'annelid[tune]'") from None
+    optuna.logging.set_verbosity(optuna.logging.ERROR)
+    return optuna
+
+
+def _study(task: Task) -> optuna.Study:
+    with warnings.catch_warnings():
+        # The sampler's options are called experimental.
+        warnings.simplefilter("ignore")
+        sampler = _optuna().samplers.TPESampler(
+            seed=task.seed, n_startup_trials=2 * generation_size(task), multivariate=True, constant_liar=True
+        )
+    return _optuna().create_study(sampler=sampler, directions=_directions(task.objectives))
+
+
+def _directions(objectives: Sequence[Objective]) -> list[str]:
+    return ["maximize" if one.more_is_better else "minimize" for one in objectives]
+
+
+def _range(variable: Variable) -> optuna.distributions.BaseDistribution:
+    """Optuna's words for a variable; a choice is its number, since Optuna's own are plain values only."""
+    kinds = _optuna().distributions
+    if isinstance(variable, Choice):
+        return kinds.CategoricalDistribution(range(len(variable.values)))
+    kind, number = (kinds.IntDistribution, int) if variable.whole else (kinds.FloatDistribution, float)
+    return kind(number(variable.low), number(variable.high), log=variable.logarithmic)
+
+
+def _place(variable: Variable, value: Any) -> Any:
+    return variable.values.index(value) if isinstance(variable, Choice) else value
+
+
+def _value(variable: Variable, place: Any) -> Any:
+    return variable.values[place] if isinstance(variable, Choice) else variable.rounded(place)
+
+
+def _stage(task: Task, found: Sequence[Trial]) -> str:
+    best = {one: leader(found, [one]) for one in task.objectives}
+    words = [f"{one.name} {one.value(trial.judged):.3g}" for one, trial in best.items() if trial is not None]
+    return f"tuning, best so far {', '.join(words)}" if words else "tuning, no gait so far"
+
+
+def _trial(name: str, values: Mapping[str, Any], case: Case, done: Done, task: Task) -> Trial:
     if done.outcome is not None:
-        return Trial(number, values, case, judge(done.outcome, numerics), done.outcome.path)
+        return Trial(name, values, case, judge(done.outcome, task.numerics), done.outcome.path)
     failed = not isinstance(done.error, ConfigError)
     problem = f"{'failed' if failed else 'cannot be built'}: {done.error}"
-    return Trial(number, values, case, Judged(None, problem), Path(), failed)
-
-
-def _scores(trial: Trial, objectives: Sequence[Objective]) -> tuple[float, ...]:
-    return tuple(trial.judged.score(objective) for objective in objectives)
+    return Trial(name, values, case, Judged(None, problem), Path(), failed)
 
 
 def front(trials: Sequence[Trial], objectives: Sequence[Objective]) -> list[Trial]:
     """Returns the Pareto front: those that walk and that no other beats in all objectives, by the first of them.
 
-    Of trials with the same run the first is taken: one of them may have the start's own values.
+    Of trials with the same run the first is taken.
     """
-    walking: dict[Path, Trial] = {}
-    for trial in trials:
-        if not trial.judged.problem:
-            walking.setdefault(trial.path, trial)
-    scores = {trial.number: _scores(trial, objectives) for trial in walking.values()}
-    kept: list[Trial] = []
-    # Whatever beats a trial comes before it.
-    for trial in sorted(walking.values(), key=lambda trial: (scores[trial.number], trial.number)):
-        mine = scores[trial.number]
-        others = (scores[other.number] for other in kept)
-        if not any(other != mine and all(a <= b for a, b in zip(other, mine, strict=True)) for other in others):
-            kept.append(trial)
-    return kept
+    walking = list({trial.path: trial for trial in reversed(trials) if not trial.judged.problem}.values())
+    study = _optuna().create_study(directions=_directions(objectives))
+    study.add_trials([_optuna().trial.create_trial(values=trial.scores(objectives)) for trial in walking])
+    kept = [walking[one.number] for one in study.best_trials]
+    return sorted(kept, key=lambda trial: trial.scores(objectives), reverse=objectives[0].more_is_better)
 
 
 def leader(trials: Sequence[Trial], objectives: Sequence[Objective]) -> Trial | None:
@@ -299,14 +312,13 @@ def leader(trials: Sequence[Trial], objectives: Sequence[Objective]) -> Trial | 
     Of one objective that is the best of all; None if none walks.
     """
     on_front = front(trials, objectives)
-    scores = {trial.number: _scores(trial, objectives) for trial in on_front}
-    spans = [(min(column), max(column)) for column in zip(*scores.values(), strict=True)]
-
-    def distance(trial: Trial) -> float:
-        pairs = zip(scores[trial.number], spans, strict=True)
-        return sum(((score - low) / (high - low or 1.0)) ** 2 for score, (low, high) in pairs)
-
-    return min(on_front, key=distance, default=None)
+    if not on_front:
+        return None
+    scores = np.array([trial.scores(objectives) for trial in on_front])
+    ideal = [max(of_it) if one.more_is_better else min(of_it) for one, of_it in zip(objectives, scores.T, strict=True)]
+    span = np.ptp(scores, axis=0)
+    distance = (((scores - ideal) / np.where(span > 0.0, span, 1.0)) ** 2).sum(axis=1)
+    return on_front[int(distance.argmin())]
 
 
 def write_results(task: Task, trials: Sequence[Trial], command: str, folder: Path) -> list[Path]:
@@ -315,9 +327,8 @@ def write_results(task: Task, trials: Sequence[Trial], command: str, folder: Pat
     Returns the paths of the CSV, the picture in pixels and the best gait.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    fields = [variable.field for variable in task.variables]
-    rows = ([_name(one), *_values(one, fields), *_numbers(one), one.judged.problem, one.path.name] for one in trials)
-    columns = ["trial", *fields, *_ROWS.values(), "problem", "run"]
+    rows = ([one.name, *one.settings(task), *one.numbers, one.judged.problem, one.path.name] for one in trials)
+    columns = ["trial", *(one.field for one in task.variables), *_ROWS.values(), "problem", "run"]
     written = [write_csv(folder / HISTORY, columns, rows), _figure(task, trials, folder / FIGURE)]
     best = leader(trials, task.objectives)
     if best is not None:
@@ -327,7 +338,7 @@ def write_results(task: Task, trials: Sequence[Trial], command: str, folder: Pat
         for old in (folder / FRONT).glob("*.toml"):
             old.unlink()
         for trial in front(trials, task.objectives):
-            write_gait(task, trial, command, folder / FRONT / f"{_name(trial)}.toml")
+            write_gait(task, trial, command, folder / FRONT / f"{trial.name}.toml")
     return written
 
 
@@ -336,12 +347,11 @@ def write_gait(task: Task, trial: Trial, command: str, path: Path) -> Path:
     before = task.start.config
     lines = [
         f"Tuned by: {command} ({task.n_trials} trials, seed {task.seed})",
-        f"{'Trial ' if trial.number != START else ''}{_name(trial)}:",
-        *(f"  {label}: {number}" for label, number in zip(_ROWS, _numbers(trial), strict=True) if number),
+        f"Trial {trial.name}:",
+        *(f"  {label}: {number}" for label, number in zip(_ROWS, trial.numbers, strict=True) if number),
         *(f"  before: {field} = {toml_value(field_value(before, field))}" for field in trial.values),
     ]
-    summary = f"{before.name}, tuned for {_words(task)}"
-    write_worm(path, task.source, {"name": path.stem, "summary": summary, **task.changes, **trial.values}, lines)
+    write_worm(path, task.source, {"name": path.stem, "summary": task.title, **task.changes, **trial.values}, lines)
     return path
 
 
@@ -353,50 +363,25 @@ def results_table(task: Task, trials: Sequence[Trial]) -> Table:
         on_front = front(trials, task.objectives)
         places = np.linspace(0, len(on_front) - 1, min(len(on_front), MOST_SHOWN))
         leaders = [on_front[round(place)] for place in places.tolist()]
-    shown = [trials[0], *(one for one in leaders if one.number != START)]
+    shown = [trials[0], *(one for one in leaders if one is not trials[0])]
     failed = sum(bool(trial.judged.problem) for trial in trials[1:])
-    table = Table(
-        "trial",
-        title=f"{task.start.config.name}, tuned for {_words(task)}",
-        caption=f"{len(trials) - 1} trials, of which {failed} did not walk",
-    )
+    caption = f"{len(trials) - 1} trials, of which {failed} did not walk"
+    table = Table("trial", title=task.title, caption=caption)
     for trial in shown:
-        table.add_column(_name(trial), justify="right")
-    for row in zip(_ROWS, *map(_numbers, shown), strict=True):
+        table.add_column(trial.name, justify="right")
+    for row in zip(_ROWS, *(trial.numbers for trial in shown), strict=True):
         table.add_row(*row)
     table.add_section()
     fields = [variable.field for variable in task.variables]
-    for row in zip(fields, *(_values(trial, fields) for trial in shown), strict=True):
+    for row in zip(fields, *(trial.settings(task) for trial in shown), strict=True):
         table.add_row(*row)
     return table
 
 
 def _figure(task: Task, trials: Sequence[Trial], stem: Path) -> Path:
-    first, *_ = objectives = task.objectives
-    values = [tuple(trial.judged.value(one) for one in objectives) for trial in trials]
-    marks = [Mark(trial.number, value, not trial.judged.problem) for trial, value in zip(trials, values, strict=True)]
-    if len(objectives) == 1:
-        return progress_figure(marks, first.label, first.more_is_better, stem)
-    on_front = {trial.number for trial in front(trials, objectives)}
-    return pareto_figure(marks, on_front, (first.label, objectives[1].label), first.more_is_better, stem)
-
-
-def _name(trial: Trial) -> str:
-    return "start" if trial.number == START else str(trial.number)
-
-
-def _words(task: Task) -> str:
-    return " and ".join(one.name.replace("-", " ") for one in task.objectives)
-
-
-def _numbers(trial: Trial) -> list[str]:
-    """The numbers of a trial's gait, each empty where there is none."""
-    found = (getattr(trial.judged.gait, name, None) for name in _ROWS.values())
-    return ["" if number is None else f"{number:.4g}" for number in found]
-
-
-def _values(trial: Trial, fields: Sequence[str]) -> list[str]:
-    """The values of the varied fields, as far as it could be built as its configuration has them."""
-    built = not trial.judged.problem.startswith("cannot be built")
-    values: list[Any] = [field_value(trial.case.config, one) if built else trial.values[one] for one in fields]
-    return [toml_value(value).strip('"') for value in values]
+    first, *others = objectives = task.objectives
+    values = [[nan] * len(objectives) if one.judged.problem else one.scores(objectives) for one in trials]
+    if not others:
+        return progress_figure([value for (value,) in values], first.label, first.more_is_better, stem)
+    on_front = {one.name: one.scores(objectives) for one in front(trials, objectives)}
+    return pareto_figure(values, on_front, [one.label for one in objectives], first.more_is_better, stem)

@@ -2,7 +2,6 @@
 
 from annelid.lazy import lazy
 from annelid.nervous.arrays import NO_GATE, NetworkArrays
-from annelid.nervous.diagram import Diagram
 from annelid.nervous.functional_subnetworks import (
     Signals,
     addition,
@@ -51,7 +50,6 @@ __all__ = [
     "Conductances",
     "Connection",
     "ConnectionKind",
-    "Diagram",
     "GapJunction",
     "Gate",
     "GateStart",

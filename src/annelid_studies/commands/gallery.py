@@ -226,13 +226,10 @@ def _bench(job: Job) -> Path:
 
 
 def _tuning(job: Job) -> Path:
-    from annelid.draw import Mark, progress_figure
-    from annelid.experiment import START
+    from annelid.draw import progress_figure
 
-    numbers = [START if row["trial"] == "start" else int(row["trial"]) for row in _rows(job)]
-    rows = zip(numbers, _rows(job), strict=True)
-    marks = [Mark(number, (float(row["speed_m_per_s"] or nan),), not row["problem"]) for number, row in rows]
-    return progress_figure(marks, "speed (m/s)", True, job.stem)
+    values = [nan if row["problem"] else float(row["speed_m_per_s"]) for row in _rows(job)]
+    return progress_figure(values, "speed (m/s)", True, job.stem)
 
 
 def _uncertainty(job: Job) -> Path:

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from annelid.draw.canvas import canvas, draw_lines, panel_title, save, save_both, segment_colors
-from annelid.protocols import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -42,72 +41,62 @@ def load_frame_figure(loops: Mapping[str, tuple[ArrayLike, ArrayLike]], stem: st
         return save_both(figure, stem)
 
 
-@dataclass(frozen=True)
-class Mark:
-    """One trial of a search for a gait."""
-
-    number: int  # negative for the gait that the search starts from
-    values: tuple[float, ...]  # of each objective
-    walks: bool
-
-
-def progress_figure(marks: Sequence[Mark], label: str, more_is_better: bool, stem: str | Path) -> Path:
-    """Draws every trial's value and the best so far over the trials' numbers; what does not walk is a tick below.
+def progress_figure(values: ArrayLike, label: str, more_is_better: bool, stem: str | Path) -> Path:
+    """Draws the value of every trial of a search and the best so far over the trials' numbers.
 
     Args:
-        marks: The trials, in their order.
+        values: The value of what the search starts from, then those of the trials, ``(1 + n,)``; NaN, a tick below, for
+            what does not walk.
         label: Of the axis, with its unit.
         more_is_better: Whether the best value is the largest.
         stem: Path of both files without a suffix.
     """
-    walking = [mark for mark in marks if mark.walks and mark.number >= 0]
-    failed = [mark.number for mark in marks if not mark.walks and mark.number >= 0]
-    numbers = np.array([mark.number for mark in walking])
-    values = np.array([mark.values[0] for mark in walking])
+    start, trials = np.split(np.asarray(values, dtype=float), [1])
+    numbers, walks = np.arange(len(trials)), np.isfinite(trials)
+    best = (np.fmax if more_is_better else np.fmin).accumulate(trials)
     with canvas(3.0) as figure:
         axes = figure.subplots()
-        axes.plot(numbers, values, "o", color=_DOT, markersize=3.5, label="a gait")
-        if walking:
-            best = np.maximum.accumulate(values) if more_is_better else np.minimum.accumulate(values)
-            axes.step(numbers, best, where="post", color=_BEST, label="best so far")
-        for mark in marks:
-            if mark.number < 0 and mark.walks:
-                axes.axhline(mark.values[0], color=_START, linestyle=(0, (4, 3)), label="start")
-        if failed:
-            floor = axes.get_xaxis_transform()
-            axes.plot(failed, np.zeros(len(failed)), "|", color="0.5", transform=floor, clip_on=False, label="no gait")
+        axes.plot(numbers, trials, "o", color=_DOT, markersize=3.5, label="a gait")
+        axes.step(numbers, best, where="post", color=_BEST, label="best so far")
+        if np.isfinite(start[0]):
+            axes.axhline(start[0], color=_START, linestyle=(0, (4, 3)), label="start")
+        if not walks.all():
+            floor: Any = {"transform": axes.get_xaxis_transform(), "clip_on": False}
+            axes.plot(numbers[~walks], 0.0 * numbers[~walks], "|", color="0.5", label="no gait", **floor)
         axes.set(xlabel="trial", ylabel=label)
         figure.legend(loc="outside upper center", ncols=4)
         return save_both(figure, stem)
 
 
 def pareto_figure(
-    marks: Sequence[Mark], front: Collection[int], labels: tuple[str, str], more_is_better: bool, stem: str | Path
+    values: ArrayLike, front: Mapping[str, Sequence[float]], labels: Sequence[str], more_is_better: bool, stem: Path
 ) -> Path:
     """Draws one objective against the other, with the front that no trial beats in both: steps over what was reached.
 
-    ``front`` has the numbers of the trials on it; of the first objective more or less is better.
+    Args:
+        values: Both values of what the search starts from, then those of the trials, ``(1 + n, 2)``; NaN for what does
+            not walk.
+        front: Both values of the trials on the front by name.
+        labels: Of both axes, with their units.
+        more_is_better: Whether more of the first objective is better.
+        stem: Path of both files without a suffix.
     """
-    walking = [mark for mark in marks if mark.walks]
-    on_front = sorted((mark for mark in walking if mark.number in front), key=lambda mark: mark.values)
+    start, *trials = np.asarray(values, dtype=float)
+    reached = sorted((*pair, name) for name, pair in front.items())
     with canvas(3.6) as figure:
         axes = figure.subplots()
-        tuned, begun = (_columns(m for m in walking if (m.number >= 0) is known) for known in (True, False))
-        axes.plot(*tuned, "o", color="0.65", markersize=3.5, label="a gait")
+        axes.plot(*np.reshape(trials, (-1, 2)).T, "o", color="0.65", markersize=3.5, label="a gait")
         steps = "steps-pre" if more_is_better else "steps-post"
-        reached = _columns(on_front)
-        axes.plot(*reached, "o-", drawstyle=steps, color=_BEST, markersize=4.5, label="front, with numbers of trials")
-        for mark, x, y in zip(on_front, *reached, strict=True):
-            axes.annotate(str(mark.number), (x, y), (5, -9), textcoords="offset points", fontsize=7, color=_BEST)
+        looks: Any = {"drawstyle": steps, "color": _BEST, "markersize": 4.5}
+        x, y = ([point[i] for point in reached] for i in (0, 1))
+        axes.plot(x, y, "o-", label="front, with numbers of trials", **looks)
+        for at_x, at_y, name in reached:
+            axes.annotate(name, (at_x, at_y), (5, -9), textcoords="offset points", fontsize=7, color=_BEST)
         axes.margins(0.08)
-        axes.plot(*begun, "D", color=_START, markersize=7, label="start")
+        axes.plot(*start, "D", color=_START, markersize=7, label="start")
         axes.set(xlabel=labels[0], ylabel=labels[1])
         figure.legend(loc="outside upper center", ncols=3)
         return save_both(figure, stem)
-
-
-def _columns(marks: Iterable[Mark]) -> Array:
-    return np.reshape([mark.values[:2] for mark in marks], (-1, 2)).T
 
 
 @dataclass(frozen=True, slots=True)

@@ -93,10 +93,8 @@ class RobustSns(CircuitKind):
                 inputs[f"pressure_{i + 1}"] = Sense.between("touch_N", place, 0.0, drive.full_pressure_N, full_nA)
         else:
             network = robust.robust_network(n_segments, design)
-        readout = Readout(
-            *([f"{half}_{i + 1}" for i in segments] for half in ("contraction", "expansion")),
-            slope_per_mV=self.activation_slope_per_mV,
-        )
+        halves = [[f"{half}_{i + 1}" for i in segments] for half in ("contraction", "expansion")]
+        readout = Readout(halves[0], halves[1], slope_per_mV=self.activation_slope_per_mV)
         if self.motor_time_constant_s:
             robust.add_motor_neurons(network, n_segments, design, 1e3 * self.motor_time_constant_s)
             readout = Readout([f"motor_{i + 1}" for i in segments], to_mV=robust.MOTOR_SHARE * reach)

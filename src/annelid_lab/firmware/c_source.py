@@ -389,8 +389,8 @@ class Writer:
             for field, value in sensed.items()
         ]
         state: dict[str, NDArray[Any]] = {}
-        if is_controller and len(self._controller.table.hysteresis):
-            state["sensor_on"] = np.zeros(len(self._controller.table.hysteresis))
+        if self._controller is not None and (n_switches := len(self._controller.table.hysteresis)):
+            state["sensor_on"] = np.zeros(n_switches)
         state |= {label: np.asarray(value) for label, value in self._steering.state.items()}
         parts = [("potential_mV", self._start.potential[0])]
         slow = [(slot, channel) for slot, channel in self._gates if slot < a.n_slow]

@@ -172,7 +172,8 @@ def gives(one: CircuitController, **potential_mV: list[float]) -> Array:
 @pytest.mark.parametrize("kind", ["sns", "adaptive", "sns-robust"])
 def test_activation_is_the_sigmoid_of_each_segments_half_centre(kind: str, n_muscles: int) -> None:
     slope: dict[str, Any] = {"activation_slope_per_mV": SLOPE_PER_MV}
-    one = controller(kind, 4, n_muscles, **({"network": slope} if kind == "adaptive" else slope))
+    fields: dict[str, Any] = {"network": slope} if kind == "adaptive" else slope
+    one = controller(kind, 4, n_muscles, **fields)
     contraction, expansion = [20.0, -3.0, 0.5, 11.0], [1.0, 18.0, 0.5, -40.0]
     expected = 1.0 / (1.0 + np.exp(-SLOPE_PER_MV * (np.array(contraction) - expansion)))
     assert gives(one, contraction=contraction, expansion=expansion) == pytest.approx(

@@ -161,6 +161,7 @@ DONE = {
     "study limit-cycle": typed("study", "limit-cycle", "--time", "located", "-o", "cycle.svg"),
     "list presets": typed("list", "presets"),
     "list arenas": typed("list", "arenas"),
+    "list numbers": typed("list", "numbers"),
     "doctor": typed("doctor"),
     "study load-frame": typed("study", "load-frame", "--displacement", "90"),
     "paper": paper,
@@ -171,7 +172,7 @@ DONE = {
     "sweep": sweep,
     "tune": tune,
 } | {name: faked(name) for name in STUDIES}
-LISTS = {"check", "list runs", "list presets", "list arenas", "doctor"}
+LISTS = {"check", "list runs", "list presets", "list arenas", "list numbers", "doctor"}
 """What prints a list; all others print an object."""
 
 

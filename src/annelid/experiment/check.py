@@ -11,12 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from annelid.body.worm import WormBody
+from annelid.analysis import NUMBERS
 from annelid.config import RunConfig
 from annelid.errors import ConfigError, listed
 from annelid.experiment.case import Case
 from annelid.experiment.executors import workers
-from annelid.experiment.numbers import NUMBERS
 from annelid.experiment.outcome import Outcome, outcome
 from annelid.experiment.progress import StudyProgress
 from annelid.experiment.store import Store, case_key
@@ -32,7 +31,7 @@ RUNS = "check"
 """Subfolder of the finer runs, and the name of the file of results."""
 RESOLVED = 0.1
 """Share of a number by which it may move; of a number that is a share, the change itself."""
-STEP, ELEMENTS, MOST_ELEMENTS = "clock.physics_timestep_s", "body.mesh.elements_per_side", 32
+STEP = "clock.physics_timestep_s"
 HALF, MORE = "half_step", "more_elements"
 """The two refinements."""
 CHECKED = (
@@ -122,11 +121,13 @@ class Check:
         further = "".join(f" {one}" for one in self.left_out)
         if self.resolved:
             worst = max(self.moved, key=lambda name: self.largest(name) or 0.0, default=None)
-            most = f"; {NUMBERS[worst].text} moves most, by {percent(self.largest(worst) or 0.0)}" if worst else ""
+            most = f"; {NUMBERS[worst].label} moves most, by {percent(self.largest(worst) or 0.0)}" if worst else ""
             return f"Resolved: with {tried} no number moves by more than {percent(RESOLVED)}{most}.{further}"
         faults = [*self.differences]
         if self.unresolved:
-            named = listed([f"{NUMBERS[name].text} ({percent(self.largest(name) or 0.0)})" for name in self.unresolved])
+            named = listed(
+                [f"{NUMBERS[name].label} ({percent(self.largest(name) or 0.0)})" for name in self.unresolved]
+            )
             faults.append(f"these numbers move by more than {percent(RESOLVED)}: {named}")
         return f"Not resolved: with {tried} {'; '.join(faults)}. {self._advice}{further}"
 
@@ -136,7 +137,7 @@ class Check:
         faults = self.unresolved
         by_step = not faults or any(self.moved[name].get(HALF, 0.0) > RESOLVED for name in faults)
         finer = halves[0] if by_step and halves else self.refinements[-1]
-        path = STEP if finer.name == HALF else ELEMENTS
+        path = STEP if finer.name == HALF else next(iter(finer.changes))
         return f"Try --set {path}={finer.changes[path]:g}, and check again."
 
     def to_dict(self) -> dict[str, Any]:
@@ -180,14 +181,15 @@ def refinements(config: RunConfig) -> tuple[tuple[Refinement, ...], tuple[str, .
         )
     half = finer_steps(config)[0]
     found = [Refinement(HALF, f"half the step ({1e3 * half[STEP]:g} ms)", half)]
-    if not isinstance(config.body, WormBody):
+    elements = config.body.elements
+    if elements is None:
         return tuple(found), (f"A body of kind {config.body.kind!r} has no elements: only its step is halved.",)
-    if config.body.formulation.is_papers:
+    if config.body.is_papers:
         return tuple(found), ("A chain keeps the paper's elements: only its step is halved.",)
-    if counts := more_elements(config):
-        found.append(Refinement(MORE, f"one more element a side ({counts[0]})", {ELEMENTS: counts[0]}))
+    if more := more_elements(config):
+        found.append(Refinement(MORE, f"one more element a side ({elements.number + 1})", more[0]))
         return tuple(found), ()
-    return tuple(found), (f"The mesh has {MOST_ELEMENTS} elements a side, the most that are allowed.",)
+    return tuple(found), (f"The mesh has {elements.most} elements a side, the most that are allowed.",)
 
 
 def compare(run: Outcome, finer: Mapping[Refinement, Outcome | str], left_out: Sequence[str] = ()) -> Check:
@@ -210,8 +212,8 @@ def compare(run: Outcome, finer: Mapping[Refinement, Outcome | str], left_out: S
         if (found.rhythm.verdict, found.summary.wave) != (run.rhythm.verdict, run.summary.wave):
             differences.append(f"the order of contractions is another one with {one.words}")
         for name in CHECKED:
-            number = NUMBERS[name]
-            change = _change(number.read(run), number.read(found), of_share=number.unit == "1")
+            values = getattr(run.summary, name), getattr(found.summary, name)
+            change = _change(*values, of_share=NUMBERS[name].unit == "1")
             if change is not None:
                 moved.setdefault(name, {})[one.name] = change
     return Check(moved, tuple(finer), tuple(left_out), tuple(differences))
@@ -333,8 +335,10 @@ def finer_steps(config: RunConfig) -> list[dict[str, float]]:
     return [finer(2), *([finer(4)] if ratio > 1 and ratio % 4 == 0 else [])]
 
 
-def more_elements(config: RunConfig) -> list[int]:
-    """Returns one and two elements a side more than a worm has, as far as that is allowed."""
-    assert isinstance(config.body, WormBody)
-    count = config.body.mesh.elements_per_side
-    return [finer for finer in (count + 1, count + 2) if finer <= MOST_ELEMENTS]
+def more_elements(config: RunConfig) -> list[dict[str, int]]:
+    """Returns what gives a body one and two elements more than it has, as far as that is allowed."""
+    elements = config.body.elements
+    if elements is None:
+        return []
+    counts = range(elements.number + 1, min(elements.number + 2, elements.most) + 1)
+    return [{elements.field: count} for count in counts]

@@ -15,6 +15,7 @@ from tempfile import TemporaryDirectory
 import annelid
 from annelid.analysis import rhythm_score
 from annelid.control import NetworkController, Sense
+from annelid.draw import network_figure
 from annelid.nervous import Network, Neuron, Synapse
 
 RANGE_mV, GAIN_nA_per_m = 20.0, 400.0
@@ -43,7 +44,7 @@ def main(folder: Path, duration_s: float = 4.0) -> None:
     config = annelid.load_config("riddle2025-muscles", {"duration_s": duration_s})
     score = rhythm_score(annelid.simulate(config, folder, controller=drive))
     print(f"{score.verdict or 'too short'}: {score.reason}")
-    print(network.diagram().save(folder / "network.svg"))
+    print(network_figure(network, folder / "network.svg"))
 
 
 if __name__ == "__main__":

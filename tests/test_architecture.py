@@ -34,7 +34,7 @@ MAY_IMPORT = {
     "engine": {"errors"},
     "morphology": set(),
     "plausibility": {"config", "morphology", "body"} | BASE,
-    "nervous": {"errors", "lazy", "text", "textfiles"},
+    "nervous": {"errors", "lazy", "markdown", "text", "textfiles"},
     "planar": {"lazy"},
     "config": {"errors", "text", "textfiles", "registry"},
     "references": {"config"},

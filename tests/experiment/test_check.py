@@ -72,7 +72,7 @@ def test_a_number_moves_by_its_relative_change_and_a_share_by_its_own(planar: Ou
 def test_what_is_lost_or_in_another_order_is_said(planar: Outcome, tmp_path: Path) -> None:
     lost = compared(planar, Done(of(planar, period_s=None)))
     assert lost.cell("period_s") == "lost\nnot resolved"
-    assert "mean interval between contractions" in lost.sentence
+    assert "period (lost)" in lost.sentence
     assert "Try --set clock.physics_timestep_s=0.0005" in lost.sentence
     assert read_json(write_json(tmp_path / "check.json", lost.to_dict()))["moved"]["period_s"] == {HALF: None}
     for finer, words in (

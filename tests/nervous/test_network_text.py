@@ -1,10 +1,8 @@
-"""Networks as TOML, Markdown, Graphviz source and SVG."""
+"""Networks as TOML and as Markdown."""
 
 import re
-import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -20,7 +18,6 @@ from annelid.nervous import (
     Neuron,
     SpikingSynapse,
     Synapse,
-    peristalsis_network,
 )
 
 any_float = st.floats(allow_nan=False, allow_infinity=False)
@@ -153,67 +150,6 @@ def small_network() -> Network:
     network.add_input("stimulus", ["up", "down|side"])
     network.add_output("read", "up")
     return network
-
-
-def test_graphviz_source_names_every_neuron_and_connection():
-    source = small_network().diagram().graphviz
-    assert source.startswith('digraph "a & b <small>" {')
-    assert source.count("{") == source.count("}")
-    assert r'n2 [label="say \"x\"", shape=circle, peripheries=1];' in source
-    assert "shape=octagon" in source
-    arrows = re.findall(r'n(\d) -> n(\d) \[label="([^"]*)".*arrowhead=(\w+)', source)
-    assert arrows == [
-        ("0", "1", "0.5 uS", "empty"),
-        ("1", "0", "0.25 uS", "dot"),
-        ("2", "0", "gates × 3", "box"),
-        # Above the target's rest of -60 mV: it excites.
-        ("0", "2", "0.125 uS", "empty"),
-        ("0", "2", "0.75 uS", "diamond"),
-        ("1", "2", "0.75 uS", "none"),
-        ("0", "0", "0.1 uS", "dot"),
-    ]
-    assert source.count("i0 -> ") == 2
-    assert "n0 -> o0" in source
-
-
-SVG = "{http://www.w3.org/2000/svg}"
-
-
-def corners_of(shape: ElementTree.Element) -> np.ndarray:
-    return np.array([pair.split(",") for pair in shape.attrib["points"].split()], dtype=float)
-
-
-@settings(max_examples=60)
-@given(network=networks())
-def test_svg_is_well_formed_and_holds_everything_within_its_frame(network):
-    root = ElementTree.fromstring(network.diagram().svg)
-    left, top, width, height = map(float, root.attrib["viewBox"].split())
-    shapes = [*root.findall(f"{SVG}polyline"), *root.findall(f"{SVG}polygon")]
-    assert sum(shape.get("id", "").startswith(("synapse-", "gap-")) for shape in shapes) == len(network.connections)
-    for shape in shapes:
-        x, y = corners_of(shape).T
-        assert left <= x.min() <= x.max() <= left + width
-        assert top <= y.min() <= y.max() <= top + height
-
-
-def test_every_neuron_of_a_worm_has_a_place_of_its_own_in_the_svg():
-    root = ElementTree.fromstring(peristalsis_network(4).diagram().svg)
-    rims = [rim for rim in root.findall(f"{SVG}polygon") if rim.get("id", "").startswith("neuron-")]
-    assert len(rims) == 16
-    assert len({tuple(corners_of(rim).mean(axis=0).round()) for rim in rims}) == 16
-    labels = [t.text for t in root.findall(f"{SVG}text")]
-    assert {"U1", "U4", "stretch 3", "kick", "segment 4", "inhibitory synapse"} <= set(labels)
-    assert any("U1: contraction" in str(label) for label in labels)
-
-
-def test_saving_and_showing_a_diagram(tmp_path):
-    diagram = small_network().diagram()
-    for name in ("a.svg", "a.dot", "a.gv"):
-        text = diagram.save(tmp_path / name).read_text(encoding="utf-8")
-        assert text == (diagram.svg if name.endswith("svg") else diagram.graphviz)
-    assert diagram._repr_svg_() == diagram.svg
-    with pytest.raises(ConfigError, match=r"'a\.png'"):
-        diagram.save(tmp_path / "a.png")
 
 
 def test_table_lists_all_with_units_and_escapes_bars():

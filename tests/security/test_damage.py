@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import signal
 import subprocess
 import sys
@@ -11,7 +12,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import xarray
 from typer.testing import CliRunner
 
 from annelid.cli import app
@@ -30,6 +30,25 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     return simulate(load_config("riddle2022-planar", {"duration_s": 0.05}), folder / "run", progress=False)
 
 
+@pytest.fixture(scope="module")
+def of_0_2(run: Run) -> bytes:
+    """The run with a digest as annelid 0.2 wrote it: a table of sums, one for each variable and one for the rest."""
+    content = run.path.read_bytes()[:-64]
+    extents = {"activation": (4096, 800), "time": (8192, 400)}
+    lines, rest = [], content
+    for name, (offset, length) in reversed(extents.items()):
+        lines.append(f"{hashlib.sha256(content[offset : offset + length]).hexdigest()} {offset} {length} {name}\n")
+        rest = rest[:offset] + rest[offset + length :]
+    lines.append(f"{hashlib.sha256(rest).hexdigest()} 0 {len(content)} \n")
+    table = "".join(lines).encode()
+    table += b"\n" * (-(len(content) + len(table)) % 64)
+    return (
+        content
+        + table
+        + digest._OLD_FOOTER.pack(digest._OLD_MAGIC, len(content), len(table), hashlib.sha256(table).digest())
+    )
+
+
 def flips(content: bytes, count: int) -> Iterator[tuple[int, bytes]]:
     """Contents with one byte changed each: at random places, then in every byte of the footer."""
     draw = np.random.default_rng(SEED)
@@ -40,9 +59,14 @@ def flips(content: bytes, count: int) -> Iterator[tuple[int, bytes]]:
         yield place, bytes(flipped)
 
 
-def test_every_flipped_byte_is_noticed(run: Run, tmp_path: Path) -> None:
+@pytest.mark.parametrize("version", ["present", "0.2"])
+def test_every_flipped_byte_is_noticed(version: str, run: Run, of_0_2: bytes, tmp_path: Path) -> None:
     path = tmp_path / "run.nc"
-    for place, content in flips(run.path.read_bytes(), 150):
+    whole = run.path.read_bytes() if version == "present" else of_0_2
+    path.write_bytes(whole)
+    assert "is intact: every byte is as it was when the run ended" in verify_run(path)
+    assert open_run(path).data.identical(run.data)
+    for place, content in flips(whole, 60):
         path.write_bytes(content)
         for read in (verify_run, open_run):
             with pytest.raises(RunFileError, match="damaged") as caught:
@@ -50,35 +74,27 @@ def test_every_flipped_byte_is_noticed(run: Run, tmp_path: Path) -> None:
             assert "\n" not in str(caught.value), place
 
 
-@pytest.mark.parametrize("name", ["activation", "time", "checkpoint/slot_1"])
-def test_the_damaged_variable_is_named_and_no_other(run: Run, tmp_path: Path, name: str) -> None:
+def test_what_a_table_of_0_2_says_of_bytes_that_are_not_there_is_damage(of_0_2: bytes, tmp_path: Path) -> None:
+    """A stranger can write any table with a right sum."""
     path = tmp_path / "run.nc"
-    group, _, variable = name.rpartition("/")
-    with xarray.open_dataset(run.path, engine="h5netcdf", group=group or None) as data:
-        own = data[variable].values.tobytes()
-    content = bytearray(run.path.read_bytes())
-    content[bytes(content).index(own) + len(own) // 2] ^= 8
-    path.write_bytes(content)
-    done = CliRunner().invoke(app, ["show", str(path), "--verify"])
-    assert done.exit_code == 2
-    assert done.stderr.rstrip().endswith(f"not as it was when the run ended: {name}")
+    end = len(of_0_2) - 64
+    overlap = "1 9 a\n" + "0" * 64 + " 2 9 b"
+    for line in ("-5 10 a", f"0 {10**30} a", "x 1 a", "1 a", "9" * 5000 + " 1 a", overlap):
+        table = f"{'0' * 64} {line}\n".encode()
+        footer = digest._OLD_FOOTER.pack(digest._OLD_MAGIC, end, len(table), hashlib.sha256(table).digest())
+        path.write_bytes(of_0_2[:end] + table + footer)
+        with pytest.raises(RunFileError, match="damaged"):
+            open_run(path)
 
 
-def test_verify_says_what_it_found(run: Run, tmp_path: Path) -> None:
-    done = CliRunner().invoke(app, ["show", str(run.path.parent), "--verify"])
-    assert done.exit_code == 0
-    assert done.stdout == f"{run.path} is intact: every byte is as it was when the run ended\n"
-    unfinished = tmp_path / "run.nc"
-    content = run.path.read_bytes()
-    unfinished.write_bytes(content[:-32] + bytes(32))
-    assert "carries no digest, so damage would not show: it has not ended, was killed, or its digest" in verify_run(
-        unfinished
-    )
-    assert open_run(unfinished).data.identical(run.data)
-    cut = tmp_path / "cut.nc"
-    cut.write_bytes(content[:-64])
+def test_a_run_without_its_digest_is_unfinished_or_cut(run: Run, tmp_path: Path) -> None:
+    path, content = tmp_path / "run.nc", run.path.read_bytes()
+    path.write_bytes(content[:-32] + bytes(32))
+    assert "carries no digest, so damage would not show: it has not ended, was killed, or its" in verify_run(path)
+    assert open_run(path).data.identical(run.data)
+    path.write_bytes(content[:-64])
     with pytest.raises(RunFileError, match="the digest at its end is missing"):
-        open_run(cut)
+        open_run(path)
 
 
 def test_a_large_file_is_compared_on_demand_only(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -89,8 +105,9 @@ def test_a_large_file_is_compared_on_demand_only(run: Run, tmp_path: Path, monke
     path.write_bytes(content)
     monkeypatch.setattr(runfile, "CHECKED_ON_OPENING_BYTES", len(content) - 1)
     assert open_run(path).status == "complete"
-    with pytest.raises(RunFileError, match="activation"):
-        verify_run(path)
+    done = CliRunner().invoke(app, ["show", str(path), "--verify"])
+    assert done.exit_code == 2
+    assert done.stderr.rstrip().endswith(f"{path} is damaged: it is not as it was when the run ended")
 
 
 def test_a_run_that_was_killed_carries_no_digest_and_opens(tmp_path: Path) -> None:
@@ -107,7 +124,7 @@ def test_a_run_that_was_killed_carries_no_digest_and_opens(tmp_path: Path) -> No
     assert "carries no digest" in verify_run(tmp_path / "run")
 
 
-@pytest.mark.parametrize("error", [KeyboardInterrupt(), OSError(5, "Input/output error"), MemoryError()])
+@pytest.mark.parametrize("error", [KeyboardInterrupt(), OSError(5, "Input/output error")])
 def test_a_digest_that_cannot_be_written_ends_the_run_with_its_own_error(
     error: BaseException, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -115,11 +132,9 @@ def test_a_digest_that_cannot_be_written_ends_the_run_with_its_own_error(
         raise error
 
     monkeypatch.setattr(digest, "write", refuse)
-    told = RunFileError if isinstance(error, OSError) else type(error)
-    with pytest.raises(told):
+    with pytest.raises(RunFileError if isinstance(error, OSError) else KeyboardInterrupt):
         simulate(load_config("riddle2022-planar", {"duration_s": 0.05}), tmp_path / "run", progress=False)
     assert open_run(tmp_path / "run").status == "complete"
-    assert "or its digest could not be written" in verify_run(tmp_path / "run")
 
 
 def test_a_run_whose_last_samples_cannot_be_written_is_not_complete(
@@ -139,34 +154,3 @@ def test_a_run_whose_last_samples_cannot_be_written_is_not_complete(
         simulate(load_config("riddle2022-planar", {"duration_s": 0.05}), tmp_path / "run", progress=False)
     left = open_run(tmp_path / "run")
     assert (left.status, left.message) == ("disk_failure", "the disk is full")
-
-
-def test_a_table_that_names_what_is_not_there_is_damage(run: Run, tmp_path: Path) -> None:
-    """A stranger can write any table with a right sum."""
-    path = tmp_path / "run.nc"
-    content = run.path.read_bytes()
-    overlap = "1 9 a\n" + "0" * 64 + " 2 9 b"
-    for line in ("0 10 a", "-5 10 a", f"0 {10**30} a", "x 1 a", "1 a", "9" * 5000 + " 1 a", overlap):
-        table = f"{'0' * 64} {line}\n".encode()
-        end = len(content) - 64
-        sums = digest.hashlib.sha256(table).digest()
-        footer = digest._FOOTER.pack(digest._MAGIC, end, len(table), sums)
-        path.write_bytes(content[:end] + table + footer)
-        with pytest.raises(RunFileError, match="damaged"):
-            open_run(path)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("preset", ["riddle2022-planar", "riddle2023-rods"])
-def test_200_flipped_bytes_are_noticed_and_harm_no_command(preset: str, tmp_path: Path) -> None:
-    config = load_config(preset, {"duration_s": 0.2})
-    whole = simulate(config, tmp_path / "run", progress=False).path.read_bytes()
-    path, noticed, harmed = tmp_path / "flipped.nc", 0, 0
-    for _, content in flips(whole, 200):
-        path.write_bytes(content)
-        noticed += CliRunner().invoke(app, ["show", str(path), "--verify"]).exit_code == 2
-        for words in (["show"], ["export", "--to", "csv", "-o", str(tmp_path / "csv"), "--force"], ["plot"]):
-            done = CliRunner().invoke(app, [words[0], str(path), *words[1:]])
-            harmed += done.exit_code != 2 or len(done.stderr.splitlines()) != 1
-    print(f"{preset}: of 264 flipped bytes {noticed} noticed, {harmed} commands of 792 not ended in a sentence")
-    assert (noticed, harmed) == (264, 0)

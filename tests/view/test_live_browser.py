@@ -122,7 +122,7 @@ def test_keys_do_what_their_list_says(live: tuple[Show, Page]) -> None:
 
 def test_neurons_take_the_colours_of_their_potentials(live: tuple[Show, Page]) -> None:
     _, page = live
-    color = "getComputedStyle(document.querySelector('.annelid-n0')).fill"
+    color = "getComputedStyle(document.querySelector('#neuron-0 path')).fill"
     seen: set[str] = set()
     wait_for(lambda: seen.add(page.evaluate(color)) or len(seen) > 1, page)
     assert page.locator(".annelid-network").get_by_text("U1", exact=True).count() == 3

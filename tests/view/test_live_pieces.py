@@ -321,7 +321,7 @@ def test_names_of_neurons_stay_words_in_the_live_diagram() -> None:
     html = network_html(network)
     assert "<img" not in html
     assert "<b>" not in html
-    assert html.count('class="annelid-n0"') == 1
+    assert html.count('id="neuron-0"') == 1
     assert colors_html([-40.0]) == colors_html([-20.0]) != colors_html([0.0])
     assert "rgb(255 255 255)" in colors_html([float("nan")])
 

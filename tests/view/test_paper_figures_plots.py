@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
+from itertools import combinations
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -14,19 +14,20 @@ import pytest
 from annelid.body import Rings
 from annelid.body.worm import WormBody
 from annelid.config import load_config
-from annelid.draw.figures import network_diagram
+from annelid.draw.figures.network_diagram import (
+    by_segment,
+    labels_of,
+    meanings_of,
+    network_figure,
+    place_neurons,
+    route_connections,
+)
 from annelid.errors import ConfigError
 from annelid.nervous import Network
-from annelid.nervous.drawing import (
-    Words,
-    effect_of,
-    labels_of,
-    lay_out,
-    network_shapes,
-)
-from annelid.nervous.key import key_shapes
 from annelid.nervous.neurons import GapJunction, ModulatorySynapse, Neuron, Synapse, persistent_sodium
 from annelid.nervous.peristalsis import peristalsis_network
+from annelid.nervous.robust import robust_network
+from annelid.nervous.tables import effect_of
 from annelid_studies.riddle2023.figures import muscle_surface, planar_models, robot_lengths
 
 
@@ -167,6 +168,7 @@ NETWORKS = {
     "4 segments": peristalsis_network(4),
     "own": own_network(),
     "columns": long_columns(),
+    "robust": robust_network(3),
 }
 
 
@@ -175,39 +177,32 @@ def network(request: pytest.FixtureRequest) -> Network:
     return request.param
 
 
-def drawn_ids(network: Network, folder: Path) -> Counter[str]:
-    svg = network_diagram.network_figure(network, folder / "network.svg")
-    ids = (node.get("id", "") for node in ElementTree.parse(svg).iter())
-    return Counter(found for found in ids if found.startswith(("neuron-", "synapse-", "gap-", "input-", "output-")))
-
-
 def test_every_part_of_a_network_is_drawn_exactly_once(network: Network, tmp_path: Path) -> None:
-    links = enumerate(network.connections)
-    expected = [
-        *(f"neuron-{name}" for name in network.neurons),
-        *(f"{'gap' if isinstance(link.kind, GapJunction) else 'synapse'}-{index}" for index, link in links),
-        *(f"input-{name}-{neuron}" for name, neurons in network.inputs.items() for neuron in neurons),
-        *(f"output-{name}" for name in network.outputs),
-    ]
-    assert drawn_ids(network, tmp_path) == Counter(expected)
+    svg = ElementTree.parse(network_figure(network, tmp_path / "network.svg"))
+    ids = Counter(
+        node.get("id", "") for node in svg.iter() if node.get("id", "").startswith(("neuron-", "connection-"))
+    )
+    expected = [f"neuron-{i}" for i in range(len(network.neurons))]
+    assert ids == Counter([*expected, *(f"connection-{i}" for i in range(len(network.connections)))])
 
 
 def test_connections_run_from_source_to_target_and_avoid_other_neurons(network: Network) -> None:
-    diagram = lay_out(network)
-    for link, route in zip(network.connections, diagram.routes, strict=True):
-        radii = [abs(route - place) for place in diagram.places.values()]
-        nearest = {name: distance.min() for name, distance in zip(diagram.places, radii, strict=True)}
-        assert abs(route[0] - diagram.places[link.source]) == pytest.approx(0.27, abs=0.03)
-        assert abs(route[-1] - diagram.places[link.target]) == pytest.approx(0.27, abs=0.03)
-        assert all(gap > 0.28 for name, gap in nearest.items() if name not in (link.source, link.target))
+    places = place_neurons(network)
+    assert min(abs(one - other) for one, other in combinations(places.values(), 2)) >= 0.999
+    for link, route in zip(network.connections, route_connections(network, places), strict=True):
+        assert abs(route[[0, -1]] - [places[link.source], places[link.target]]) == pytest.approx(0.27, abs=0.03)
+        others = [place for name, place in places.items() if name not in (link.source, link.target)]
+        assert all(abs(route - place).min() > 0.28 for place in others)
 
 
-def test_segments_are_columns_from_left_to_right() -> None:
-    diagram = lay_out(peristalsis_network(12))
-    assert list(diagram.columns) == list(range(1, 13))
-    x = np.array([[diagram.places[name].real for name in names] for names in diagram.columns.values()])
+def test_segments_are_columns_from_left_to_right_and_other_neurons_stand_below() -> None:
+    network = robust_network(12)
+    places = place_neurons(network)
+    segments, others = by_segment(network.neurons)
+    x = np.array([[places[name].real for name in names] for names in segments.values()])
     assert np.all(x[:-1].max(axis=1) < x[1:].min(axis=1))
-    assert lay_out(own_network()).columns == {}
+    assert others == ["tonic"]
+    assert places["tonic"].imag < min(places[name].imag for names in segments.values() for name in names)
 
 
 def test_effects_come_from_reversal_and_rest() -> None:
@@ -217,28 +212,12 @@ def test_effects_come_from_reversal_and_rest() -> None:
     assert effects[-2:] == ["gap junction", "rectified gap junction"]
 
 
-def test_a_network_without_columns_has_its_names_in_the_neurons_and_long_ones_in_the_key() -> None:
+def test_long_names_are_shortened_and_explained() -> None:
     network = Network()
     for name in ("left", "half_centre_1", "half_centre_2"):
         network.add_neuron(name, Neuron())
-    labels = labels_of(network)
-    assert labels["left"] == "left"
-    assert len(set(labels.values())) == 3
-    assert max(map(len, labels.values())) <= 9
-    written = [
-        shape.text
-        for shape in key_shapes(network, network_shapes(network, strengths=False), 1.0)
-        if isinstance(shape, Words)
-    ]
-    assert any("half_centre" in text for text in written)
-
-
-def test_a_diagram_and_the_figure_of_a_network_have_the_same_parts_and_key(network: Network, tmp_path: Path) -> None:
-    svg = network.diagram().svg
-    shown = set(re.findall(r'id="([^"]+)"', svg))
-    assert shown == set(drawn_ids(network, tmp_path))
-    assert "synapse</text>" in svg
-    assert "input current" in svg or not network.inputs
+    assert labels_of(network) == {"left": "left", "half_centre_1": "hal", "half_centre_2": "hal"}
+    assert meanings_of(network) == ["hal: half_centre"]
 
 
 # Figure 9

@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
+from annelid.analysis import NUMBERS
 from annelid.body.worm import WormBody
 from annelid.config import RunConfig
 from annelid.errors import ConfigError, listed
 from annelid.experiment.case import Case
-from annelid.experiment.numbers import NUMBERS
 from annelid.experiment.outcome import Outcome
 from annelid.experiment.progress import StudyProgress
 from annelid.experiment.store import Done, Store
@@ -125,7 +125,7 @@ class Check:
         further = f" {self.left_out}" if self.left_out else ""
 
         def named(name: str) -> str:
-            return f"{NUMBERS[name].text} ({percent(self.largest(name))})"
+            return f"{NUMBERS[name].label} ({percent(self.largest(name))})"
 
         if self.resolved:
             most = "" if self.worst is None else f"; most of all moves {named(self.worst)}"
@@ -207,8 +207,8 @@ def compare(run: Outcome, finer: Mapping[Refinement, Done], left_out: str = "") 
         if (found.rhythm.verdict, found.summary.wave) != (run.rhythm.verdict, run.summary.wave):
             differences.append(f"the order of contractions is another one with {one.words}")
         for name in CHECKED:
-            number = NUMBERS[name]
-            change = _change(number.read(run), number.read(found), of_share=number.unit == "1")
+            before, after = getattr(run.summary, name), getattr(found.summary, name)
+            change = _change(before, after, of_share=NUMBERS[name].unit == "1")
             if change is not None:
                 moved.setdefault(name, {})[one.name] = change
     return Check(moved, tuple(finer), left_out, tuple(differences))

@@ -16,12 +16,13 @@ from typing import Any
 
 from rich.table import Table
 
+from annelid.analysis import NUMBERS
+from annelid.analysis.numbers import UNKNOWN, Number
 from annelid.body.worm import WormBody
 from annelid.config import RunConfig
 from annelid.draw.figures.experiments import uncertainty_figure
 from annelid.draw.table import framed_table
 from annelid.errors import ConfigError
-from annelid.experiment.numbers import NUMBERS
 from annelid.experiment.outcome import Outcome
 from annelid.experiment.progress import StudyProgress
 from annelid.experiment.spread import UNMEASURED, Spread, applicable, changes, draw, read_spread, scaled_fields
@@ -44,19 +45,17 @@ DEFINITIONS = {
 }
 NOT_CONVERGED = 0.5
 """Numerical error, of the value, above which a quantity does not count as converged."""
-UNKNOWN = "-"
-SHOWN: Mapping[str, tuple[str, str, float, int]] = {
-    "period_s": ("period", "s", 1.0, 3),
-    "elongation_mean_max_m": ("elongation {}, mean", "cm", 100.0, 2),
-    "elongation_first_helix_pp_m": ("first helix {}, pp", "cm", 100.0, 2),
-    "middle_deficit_mean": ("middle deficit, mean", "%", 100.0, 1),
-    "middle_deficit": ("middle deficit, pp", "%", 100.0, 1),
-    "contraction_force_median_N": ("force, median", "N", 1.0, 2),
-    "travel_m": ("travel forwards", "mm", 1000.0, 1),
-    "speed_m_per_s": ("speed", "mm/s", 1000.0, 2),
-}
-"""What gets error bars, of `NUMBERS`: its label, with the segment where it is one per segment, the unit in which it is
-shown, what the value is multiplied by for that, and digits behind the point where no error says how many."""
+SHOWN = (
+    "period_s",
+    "elongation_mean_max_m",
+    "elongation_first_helix_pp_m",
+    "middle_deficit_mean",
+    "middle_deficit",
+    "contraction_force_median_N",
+    "travel_m",
+    "speed_m_per_s",
+)
+"""The numbers that get error bars."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,10 +79,15 @@ class Quantity:
     n_samples: int
 
     @property
+    def number(self) -> Number:
+        """What the number is, and how a table shows it."""
+        return NUMBERS[self.name.partition(".")[0]]
+
+    @property
     def label(self) -> str:
         """What it is called."""
-        field, _, segment = self.name.partition(".")
-        return SHOWN[field][0].format(segment)
+        segment = self.name.partition(".")[2]
+        return f"{self.number.label} {segment}".rstrip()
 
     @property
     def errors(self) -> dict[str, float | None]:
@@ -123,7 +127,7 @@ class Quantity:
     def row(self) -> dict[str, Any]:
         """What the files of results say of it."""
         return {
-            "unit": NUMBERS[self.name.partition(".")[0]].unit,
+            "unit": self.number.unit,
             "value": self.value,
             "parameters": self.parameters,
             "time_step": self.time_step,
@@ -136,24 +140,21 @@ class Quantity:
 
     def error_text(self, error: float | None) -> str:
         """Writes one of its errors with the digits that show two of the total."""
-        return UNKNOWN if error is None else f"{self._format[1] * error:.{self._digits}f}"
+        return UNKNOWN if error is None else f"{self.number.factor * error:.{self._digits}f}"
 
     def __str__(self) -> str:
         """Its value with its total error, to two digits of the error: ``6.15 +- 0.21 cm``."""
         if self.value is None:
             return UNKNOWN
-        unit, factor, _ = self._format
         error = "" if self.total is None else f" +- {self.error_text(self.total)}"
-        return f"{factor * self.value:z.{self._digits}f}{error} {unit}"
-
-    @property
-    def _format(self) -> tuple[str, float, int]:
-        return SHOWN[self.name.partition(".")[0]][1:]
+        return f"{self.number.factor * self.value:z.{self._digits}f}{error} {self.number.shown_unit}".rstrip()
 
     @property
     def _digits(self) -> int:
-        _, factor, digits = self._format
-        return min(max(1 - floor(log10(factor * self.total)), 0), digits + 1) if self.total else digits
+        digits = self.number.digits
+        if not self.total:
+            return digits
+        return min(max(1 - floor(log10(self.number.factor * self.total)), 0), digits + 1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -272,7 +273,7 @@ def readings(outcome: Outcome) -> dict[str, float | None]:
     """Returns what gets error bars in SI units by name, with the segment behind a point."""
     found: dict[str, float | None] = {}
     for name in SHOWN:
-        value = NUMBERS[name].read(outcome)
+        value = getattr(outcome.summary, name)
         if NUMBERS[name].per_segment:
             values = [None] * outcome.summary.n_segments if value is None else value
             found |= {f"{name}.{segment}": one for segment, one in enumerate(values, start=1)}

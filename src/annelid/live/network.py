@@ -7,8 +7,9 @@ from html import escape
 import numpy as np
 from numpy.typing import ArrayLike
 
+from annelid.draw.figures.network_diagram import meanings_of, network_svg
 from annelid.nervous import Network
-from annelid.nervous.drawing import meanings_of
+from annelid.text import printable
 
 FULL_MV = 20.0
 """Potential above or below rest at which a colour is full."""
@@ -16,13 +17,11 @@ BELOW, AT_REST, ABOVE = (0.48, 0.62, 0.95), (1.0, 1.0, 1.0), (0.96, 0.58, 0.25)
 
 
 def network_html(network: Network) -> str:
-    """Returns the diagram of `annelid.nervous.Network.diagram`, with a class for every neuron."""
-    svg = network.diagram(details=False).svg
-    for number, name in enumerate(network.neurons):
-        svg = svg.replace(f'id="{escape(f"neuron-{name}")}"', f'class="annelid-n{number}"', 1)
+    """Returns the drawing of a network and what its colours and labels mean."""
     colors = f"blue {FULL_MV:g} mV below rest, white at rest, orange {FULL_MV:g} mV above"
-    key = escape("; ".join([colors, *meanings_of(network)]))
-    return f'<div class="annelid-network">{svg}<p style="font-size:0.8em;margin:0.3em 0.6em">{key}</p></div>'
+    key = escape(printable("; ".join([colors, *meanings_of(network)])))
+    drawing = network_svg(network)
+    return f'<div class="annelid-network">{drawing}<p style="font-size:0.8em;margin:0.3em 0.6em">{key}</p></div>'
 
 
 def colors_html(potential_mV: ArrayLike) -> str:
@@ -30,7 +29,5 @@ def colors_html(potential_mV: ArrayLike) -> str:
     share = np.clip(np.nan_to_num(np.asarray(potential_mV, dtype=float)) / FULL_MV, -1.0, 1.0)[:, np.newaxis]
     rest, ends = np.asarray(AT_REST), np.where(share < 0, BELOW, ABOVE)
     colors = np.rint(255 * (rest + np.abs(share) * (ends - rest))).astype(int)
-    # A second rim, inside the first, would cover it.
-    rule = ".annelid-n{0}{{fill:rgb({1} {2} {3})}}.annelid-n{0}+polygon{{fill:none}}"
-    rules = (rule.format(number, *color) for number, color in enumerate(colors.tolist()))
-    return f"<style>{''.join(rules)}</style>"
+    rule = "#neuron-{0} path{{fill:rgb({1} {2} {3})!important}}"
+    return f"<style>{''.join(rule.format(i, *color) for i, color in enumerate(colors.tolist()))}</style>"

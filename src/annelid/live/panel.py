@@ -11,7 +11,7 @@ import numpy as np
 
 from annelid.config import Knob, RunConfig
 from annelid.draw.canvas import CONTRACTED, RELAXED, segment_colors
-from annelid.draw.figures.network_diagram import network_of
+from annelid.draw.figures.network_diagram import by_segment, network_of, role_of
 from annelid.live.living import knobs_of
 from annelid.live.network import colors_html, network_html
 from annelid.live.picture import CONTACT_COLOR, SPRING_COLORS, SPRING_RANGE, STRAND_COLORS
@@ -19,7 +19,6 @@ from annelid.live.player import FASTEST, SLOWEST
 from annelid.live.stage import LAYERS
 from annelid.live.view import View
 from annelid.morphology import Array
-from annelid.nervous.drawing import by_segment, role_of
 
 if TYPE_CHECKING:
     import viser

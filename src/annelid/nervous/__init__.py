@@ -2,7 +2,6 @@
 
 from annelid.lazy import moved
 from annelid.nervous.arrays import NO_GATE, NetworkArrays
-from annelid.nervous.diagram import Diagram
 from annelid.nervous.functional_subnetworks import (
     Signals,
     addition,
@@ -55,7 +54,6 @@ __all__ = [
     "Conductances",
     "Connection",
     "ConnectionKind",
-    "Diagram",
     "Factors",
     "Firing",
     "GapJunction",

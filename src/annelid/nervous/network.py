@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Self
+from typing import NoReturn, Self
 
 import numpy as np
 
+from annelid.errors import ConfigError
 from annelid.nervous.arrays import NetworkArrays, build_arrays
-from annelid.nervous.diagram import Diagram, draw_diagram, markdown_tables
 from annelid.nervous.stepper import Scheme, Stepper
+from annelid.nervous.tables import markdown_tables
 from annelid.nervous.toml import read_network, write_network
 from annelid.nervous.wiring import Wiring
 
@@ -63,13 +64,15 @@ class Network(Wiring):
         total += np.abs(arrays.weights[arrays.drive["rectified"], len(arrays.neurons) :]).sum(axis=0)
         return float(np.min(2.0 * arrays.capacitance_nF / np.maximum(total, np.finfo(float).tiny)))
 
-    def diagram(self, *, details: bool = True) -> Diagram:
-        """Returns the network drawn: ``.graphviz`` (source text), ``.svg``, and ``.save(path)`` for either.
+    def diagram(self, **_: object) -> NoReturn:
+        """Names the function that draws a network; this method has gone.
 
-        Args:
-            details: Whether the picture has a key, and strengths where there are few connections.
+        Raises:
+            ConfigError: Always.
         """
-        return draw_diagram(self, details=details)
+        raise ConfigError(
+            "Network.diagram has been removed: annelid.draw.network_figure(network, 'network.svg') draws it"
+        )
 
     def table(self) -> str:
         """Returns neurons, connections, inputs and outputs as Markdown tables."""

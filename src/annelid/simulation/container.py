@@ -23,8 +23,9 @@ from numpy.typing import NDArray
 from annelid.errors import RunFileError
 from annelid.output import whole_file
 from annelid.simulation import digest
-from annelid.simulation.digest import Extent
 
+Extent = tuple[int, int]
+"""Where a variable lies in the file: its offset and its length, bytes."""
 _METADATA_BYTES = 262_144
 
 
@@ -72,7 +73,7 @@ def create(
             _try_room(draft, needed)
             extents = _lay_out(draft, sizes, variables, attrs)
             with open(draft, "r+b") as handle:
-                handle.write(digest.room(extents, handle.seek(0, os.SEEK_END)))
+                handle.write(digest.room(handle.seek(0, os.SEEK_END)))
                 handle.flush()
                 os.fsync(handle.fileno())
     except BaseException as error:
@@ -172,7 +173,7 @@ class RawWriter:
     def finish(self) -> None:
         """Writes the digest of the file, which is not to change any more, and hands everything to the disk."""
         with self._named():
-            digest.write(self._file, self._extents)
+            digest.write(self._file)
             os.fsync(self._file.fileno())
 
     def close(self) -> None:

@@ -6,11 +6,11 @@ killed process leaves behind locks nothing.
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import shlex
 import sys
-import threading
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -18,56 +18,58 @@ from datetime import datetime
 from functools import wraps
 from inspect import signature
 from pathlib import Path
-from typing import ParamSpec, TypeVar
+from typing import TYPE_CHECKING, ParamSpec, TypeVar
 
 from annelid.errors import ConfigError, RunFileError, shortened
 
+if TYPE_CHECKING:
+    from filelock import BaseFileLock
+
 LOCK_NAME = ".annelid.lock"
 
-_FLAGS = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_CLOEXEC", 0)
 _HOLDER_BYTES = 4096
 _ATTEMPTS = 100
-# Windows keeps others from reading what is locked, so the lock lies beyond the text.
-_LOCKED_BYTE = 1 << 30
+_WITHOUT_LOCKS = frozenset({errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOTSUP})
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
-
-_held: set[tuple[int, int, Path]] = set()
-"""Locks of this process, each with its process and thread: within one, the same thread may lock again."""
 
 
 @contextmanager
 def locked(folder: str | Path, *, new: bool = False) -> Iterator[Path]:
     """Keeps every other writer out of a folder, which is made if it is not there; yields it.
 
-    Folders that were made for the lock and are empty at its end are removed. A new folder is to be made, and no other.
+    The same thread may lock again. Folders that were made for the lock and are empty at its end are removed. A new
+    folder is to be made, and no other.
 
     Raises:
         ConfigError: It is a file.
         FileExistsError: It is there and should be new.
         RunFileError: Another process or thread writes there, or it cannot be made or written.
     """
-    folder = Path(folder)
-    lock = os.getpid(), threading.get_ident(), folder.resolve()
-    if lock in _held:
+    folder, file = Path(folder), Path(folder).resolve() / LOCK_NAME
+    lock = _lock_of(file)
+    if lock.is_locked:
         yield folder
         return
     made = [each for each in (folder, *folder.parents) if not each.exists()]
     try:
-        descriptor = _take(folder, new)
+        _take(lock, folder, new)
     except FileExistsError:
         # Another made it since, and it may still be empty.
         raise
     except BaseException:
         _remove_empty(made)
         raise
-    _held.add(lock)
+    own = file.stat() if lock.is_locked else None
     try:
         yield folder
     finally:
-        _held.discard(lock)
-        _release(folder / LOCK_NAME, descriptor)
+        with suppress(OSError):
+            # While it is locked, and only if it is the same file, so that nobody else's is removed.
+            if own is not None and os.path.samestat(own, file.stat()):
+                file.unlink()
+        lock.release()
         _remove_empty(made)
 
 
@@ -89,12 +91,20 @@ def locks(parameter: str) -> Callable[[Callable[_P, _R]], Callable[_P, _R]]:
     return decorated
 
 
-def _take(folder: Path, new: bool) -> int:
-    """Makes a folder and locks it; returns the descriptor of its lock file."""
+def _lock_of(file: Path) -> BaseFileLock:
+    """Returns the lock on a file, the same one for every call, with a state for each thread."""
+    from filelock import FileLock
+
+    return FileLock(file, timeout=0, is_singleton=True, fallback_to_soft=False, on_acquired=_write_holder)
+
+
+def _take(lock: BaseFileLock, folder: Path, new: bool) -> None:
+    """Makes a folder and locks it."""
+    from filelock import Timeout
+
     try:
-        problem = "it cannot be made"
         for _ in range(_ATTEMPTS):
-            # Whoever ends a lock removes the lock file, and the folder if it is empty.
+            # Whoever ends a lock removes the folder if it is empty.
             with suppress(FileNotFoundError):
                 try:
                     folder.mkdir(parents=True, exist_ok=not new)
@@ -102,90 +112,47 @@ def _take(folder: Path, new: bool) -> int:
                     if new or folder.is_file():
                         raise
                     continue
-                problem = "it comes and goes"
-                descriptor = os.open(folder / LOCK_NAME, _FLAGS, 0o666)
-                try:
-                    if not _lock(descriptor, folder):
-                        if new:
-                            raise FileExistsError(folder)
-                        raise RunFileError(_taken(folder, os.read(descriptor, _HOLDER_BYTES)))
-                    if os.path.samestat(os.fstat(descriptor), os.stat(folder / LOCK_NAME)):
-                        os.ftruncate(descriptor, 0)
-                        os.write(descriptor, _holder())
-                        return descriptor
-                except BaseException:
-                    os.close(descriptor)
-                    raise
-                os.close(descriptor)
-        raise RunFileError(f"cannot write into the folder {folder}: {problem}")
+                lock.acquire()
+                return
+        raise RunFileError(f"cannot write into the folder {folder}: it cannot be made")
+    except Timeout:
+        if new:
+            raise FileExistsError(folder) from None
+        holder = _holder(Path(lock.lock_file))
+        raise RunFileError(f"{holder} writes into the folder {folder}: name another, or wait for its end") from None
     except FileExistsError:
         if new:
             raise
         raise ConfigError(f"{folder} is a file: name a folder") from None
     except OSError as error:
-        raise RunFileError(f"cannot write into the folder {folder}: {error.strerror}") from None
+        if error.errno not in _WITHOUT_LOCKS:
+            raise RunFileError(f"cannot write into the folder {folder}: {error.strerror}") from None
+        warnings.warn(
+            f"{folder} is on a file system without locks ({error.strerror}): let no other process write there",
+            stacklevel=2,
+        )
 
 
-if sys.platform == "win32":
-    import msvcrt
-
-    def _lock(descriptor: int, folder: Path) -> bool:
-        """Takes the lock; false where another has it."""
-        os.lseek(descriptor, _LOCKED_BYTE, os.SEEK_SET)
-        try:
-            msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
-        except OSError:
-            return False
-        finally:
-            os.lseek(descriptor, 0, os.SEEK_SET)
-        return True
-
-    def _release(lock: Path, descriptor: int) -> None:
-        """Lets go of the lock, and removes its file, which Windows allows for a closed one only."""
-        os.close(descriptor)
-        with suppress(OSError):
-            lock.unlink()
-
-else:
-    import fcntl
-
-    def _lock(descriptor: int, folder: Path) -> bool:
-        """Takes the lock; false where another has it."""
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            return False
-        except OSError as error:
-            warnings.warn(
-                f"{folder} is on a file system without locks ({error.strerror}): let no other process write there",
-                stacklevel=2,
-            )
-        return True
-
-    def _release(lock: Path, descriptor: int) -> None:
-        """Removes the lock file while it is locked, so that no one else's is removed, and lets go of it."""
-        with suppress(OSError):
-            if os.path.samestat(os.fstat(descriptor), os.stat(lock)):
-                lock.unlink()
-        os.close(descriptor)
-
-
-def _holder() -> bytes:
+def _write_holder(descriptor: int) -> None:
     program = Path(sys.argv[0]).name or "python"
     since = datetime.now().astimezone().isoformat(sep=" ", timespec="seconds")
     command = shlex.join([program, *sys.argv[1:]])[: _HOLDER_BYTES // 8]
-    return json.dumps({"pid": os.getpid(), "since": since, "command": command}).encode()
+    os.ftruncate(descriptor, 0)
+    # Windows keeps others from reading the first byte of a locked file.
+    os.write(descriptor, b" " + json.dumps({"pid": os.getpid(), "since": since, "command": command}).encode())
 
 
-def _taken(folder: Path, holder: bytes) -> str:
+def _holder(file: Path) -> str:
+    """Says who holds a lock, as far as its file tells."""
     try:
-        said = json.loads(holder)
+        with file.open("rb") as content:
+            content.seek(1)
+            said = json.loads(content.read(_HOLDER_BYTES))
         # The file may be anybody's, and the sentence is one line.
         since, command = (shortened(ascii(str(said[key]))[1:-1]) for key in ("since", "command"))
-        who = f"process {shortened(str(int(said['pid'])))} (since {since}: {command})"
-    except (ValueError, TypeError, KeyError, OverflowError, RecursionError):
-        who = "another process"
-    return f"{who} writes into the folder {folder}: name another, or wait for its end"
+        return f"process {shortened(str(int(said['pid'])))} (since {since}: {command})"
+    except (OSError, ValueError, TypeError, KeyError, OverflowError, RecursionError):
+        return "another process"
 
 
 def _remove_empty(folders: list[Path]) -> None:

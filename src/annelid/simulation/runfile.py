@@ -16,10 +16,10 @@ import numpy as np
 from pydantic import ValidationError
 
 from annelid.config import REPLACED, RunConfig, field_value, fields_of, has_field
-from annelid.errors import ConfigError, RunFileError, UnreadableText, listed
+from annelid.errors import ConfigError, RunFileError, UnreadableText
 from annelid.registry import Registry
+from annelid.simulation import digest
 from annelid.simulation.checkpoint import Checkpoint, newest_payload
-from annelid.simulation.digest import Finding, examine
 from annelid.simulation.lock import LOCK_NAME
 from annelid.textfiles import parse_json
 
@@ -238,14 +238,13 @@ def read_checkpoint(path: str | Path) -> Checkpoint:
 def verify_run(path: str | Path) -> str:
     """Compares a whole run file, of any size, with the digest that was written when the run ended.
 
-    Returns a sentence: that it is intact, or that and why it carries no digest. Raises as `open_run`; for a damaged
-    file the error names the variables that differ.
+    Returns a sentence: that it is intact, or that and why it carries no digest. Raises as `open_run`.
     """
-    file, finding = _examined_file(path, whole=True)
-    if finding.state == "intact":
+    file, state = _examined_file(path, whole=True)
+    if state == "intact":
         return f"{file} is intact: every byte is as it was when the run ended"
     reason = "an older version of annelid wrote it"
-    if finding.state == "unfinished":
+    if state == "unfinished":
         reason = "it has not ended, was killed, or its digest could not be written"
     return f"{file} carries no digest, so damage would not show: {reason}"
 
@@ -261,7 +260,7 @@ def refuse_used_folder(out: Path, overwrite: bool) -> None:
         raise RunFileError(f"cannot use the output folder {out}: {error.strerror}") from None
 
 
-def _examined_file(path: str | Path, *, whole: bool = False) -> tuple[Path, Finding]:
+def _examined_file(path: str | Path, *, whole: bool = False) -> tuple[Path, digest.State]:
     """Returns the run file behind a path and what its digest says, once it is clear that it is safe to read.
 
     The whole of a large file is compared with its digest only if asked for.
@@ -278,10 +277,9 @@ def _examined_file(path: str | Path, *, whole: bool = False) -> tuple[Path, Find
             raise RunFileError(f"{file} is not an annelid run: it is not a file")
         if size == 0:
             raise RunFileError(f"{file} is empty")
-        finding = examine(file, footer_only=not whole and size > CHECKED_ON_OPENING_BYTES)
-        if finding.state == "damaged":
-            names = listed(ascii(name)[1:-1] for name in finding.damaged)
-            raise RunFileError(f"{file} is damaged: not as it was when the run ended: {names}")
+        state = digest.examine(file, compared=whole or size <= CHECKED_ON_OPENING_BYTES)
+        if state == "damaged":
+            raise RunFileError(f"{file} is damaged: it is not as it was when the run ended")
         if not h5py.is_hdf5(file):
             raise RunFileError(f"{file} is not an annelid run: it is not a netCDF-4 file")
         with h5py.File(file, "r") as content:
@@ -293,12 +291,12 @@ def _examined_file(path: str | Path, *, whole: bool = False) -> tuple[Path, Find
                     f"{SCHEMA_VERSION}: a newer annelid wrote it"
                 )
             check_content(content, size)
-            if schema > 0 and finding.state == "absent":
+            if schema > 0 and state == "absent":
                 raise RunFileError(f"{file} is truncated or damaged: the digest at its end is missing")
             ours = "config" in content.attrs and "annelid_version" in content.attrs
             if not ours or any(name not in content for name in _BOOKKEEPING):
                 raise RunFileError(f"{file} is not an annelid run: another program wrote it")
-    return file, finding
+    return file, state
 
 
 def _schema_of(content: h5py.File) -> int:

@@ -1,41 +1,72 @@
-"""The diagram of a network of neurons, drawn from the network itself; figure 6 of the paper."""
+"""The diagram of a network of neurons, drawn from the network itself; figure 6 of the paper.
+
+Points of the plane are complex numbers, x to the right and y upwards, in units of the distance between neighbouring
+neurons.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import re
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from io import StringIO
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from annelid.config import RunConfig
 from annelid.draw.canvas import WIDTH_IN, canvas, plain, save
 from annelid.draw.figures import RUN_FIGURES
 from annelid.errors import RunFileError
 from annelid.nervous import Network
-from annelid.nervous.drawing import Shape, Words, frame_of, network_shapes
-from annelid.nervous.key import key_shapes
+from annelid.nervous.tables import Effect, effect_of
 from annelid.output import with_suffix
 from annelid.simulation import Run, build_plant
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
-_SMALLEST_UNIT_IN, _SMALLEST_UNIT_WITH_NUMBERS_IN, _LARGEST_UNIT_IN = 0.5, 0.9, 1.0
-_PAPER = {"facecolor": "w", "edgecolor": "none", "pad": 0.8, "alpha": 0.85}
+Path2D = NDArray[np.complexfloating]
+
 NETWORK_SUFFIXES = (".png", ".pdf", ".svg")
+SYMBOLS = {"contraction": "U1", "expansion": "U2", "sensory": "U3", "relay": "U4"}
+"""The paper's symbols of the neurons of a segment, by the part of a neuron's name before its segment's number."""
+_GREY, _ARROW = "#595959", "#4d4d4d"
+# Colour, dashes, corners of the mark at the end (0 for none), whether it is filled, and its marker in the key.
+# Dark and light in grey, hues far apart for colour-blind eyes.
+_LOOKS: dict[Effect, tuple[str, Any, int, bool, Any]] = {
+    "excitatory": ("#c2410c", "-", 3, False, ">"),
+    "inhibitory": ("#1b2a6b", "-", 40, True, "o"),
+    "modulatory": (_GREY, "--", 4, False, "D"),
+    "gap junction": (_GREY, (0, (1, 1)), 0, False, None),
+    "rectified gap junction": (_GREY, (0, (1, 1)), 3, True, ">"),
+}
+_RADIUS = 0.27  # of a neuron
+_MARK = 0.075  # radius of the mark at the end of a connection
+_STUB = 0.42  # length of the arrow of an input or an output
+_COLUMN_GAP = 1.35
+_IN_A_ROW = 2  # neurons of a segment that stand beside each other
+_LONGEST_LABEL = 7  # letters that can be read in a neuron
+_CROWDED, _ROOMY = 0.92, 0.6  # cosines of angles between lines at a neuron: they overlap, they have room
+_BENDS = (0.0, 0.25, -0.25, 0.4, -0.4, 0.6, -0.6, 0.8, -0.8, 1.1, -1.1)
+_UNIT_IN = (0.55, 1.0)  # least and largest length of a unit, inches
+_PAPER: Any = {"bbox": {"facecolor": "white", "edgecolor": "none", "pad": 0.5, "alpha": 0.8}, "zorder": 3}
+_NUMBERED = re.compile(r"(.+)_(\d{1,9})")
 
 
-def network_figure(network: Network, path: str | Path, *, conductances: bool = False) -> Path:
+def network_figure(network: Network, path: str | Path) -> Path:
     """Draws any network, each neuron, connection, input and output once, with a key to its symbols.
 
-    The keys of `annelid.nervous.drawing.network_shapes` are ids in an SVG file.
+    In an SVG file neurons have the ids ``neuron-<i>`` and connections ``connection-<i>``, in the network's order.
 
     Args:
         network: The network.
         path: File to write; its suffix chooses the format (``.png``, ``.pdf``, ``.svg``); a name without
             one becomes a ``.png``.
-        conductances: Whether to write beside each connection how strong it is.
 
     Returns:
         The path written.
@@ -44,16 +75,20 @@ def network_figure(network: Network, path: str | Path, *, conductances: bool = F
         RunFileError: The file has another suffix or cannot be written.
     """
     path = with_suffix(path, NETWORK_SUFFIXES, "a network", default=".png")
-    shapes = network_shapes(network, strengths=conductances)
-    left, right, _, _ = frame_of(shapes, _SMALLEST_UNIT_IN)
-    smallest_in = _SMALLEST_UNIT_WITH_NUMBERS_IN if conductances else _SMALLEST_UNIT_IN
-    unit_in = min(max(WIDTH_IN / (right - left), smallest_in), _LARGEST_UNIT_IN)
-    shapes += key_shapes(network, shapes, unit_in)
-    frame = left, right, bottom, top = frame_of(shapes, unit_in)
-    with canvas(unit_in * (top - bottom), unit_in * (right - left)) as figure:
-        figure.set_layout_engine("none")
-        _paint(figure.add_axes((0.0, 0.0, 1.0, 1.0)), shapes, frame)
-        return save(figure, path)
+    with _drawn(network) as figure:
+        _draw_key(figure, network)
+        return save(figure, path, bbox_inches="tight", pad_inches=0.1)
+
+
+def network_svg(network: Network) -> str:
+    """Returns the drawing of `network_figure`, without its key, as the SVG element of a web page."""
+    import matplotlib
+
+    text = StringIO()
+    nothing = dict.fromkeys(("Creator", "Date", "Format", "Type"))
+    with _drawn(network) as figure, matplotlib.rc_context({"svg.fonttype": "none"}):
+        figure.savefig(text, format="svg", bbox_inches="tight", transparent=True, metadata=nothing)
+    return text.getvalue()[text.getvalue().index("<svg") :]
 
 
 def network_of(config: RunConfig, neurons: Sequence[str]) -> Network | None:
@@ -80,35 +115,278 @@ def run_network_figure(run: Run, path: str | Path) -> Path:
 RUN_FIGURES.add("network", run_network_figure)
 
 
-def _paint(axes: Axes, shapes: Iterable[Shape], frame: tuple[float, float, float, float]) -> None:
-    """Draws shapes from back to front; the frame is left, right, bottom and top of the axes."""
-    from matplotlib.patches import Polygon
+def role_of(name: str) -> str:
+    """Returns a neuron's name without its segment's number."""
+    match = _NUMBERED.fullmatch(name)
+    return match[1] if match else name
 
-    axes.set(xlim=frame[:2], ylim=frame[2:], aspect="equal")
-    axes.axis("off")
-    # With one height for all, what is added later is drawn over the rest.
-    for shape in shapes:
-        if isinstance(shape, Words):
-            axes.text(
-                shape.place.real,
-                shape.place.imag,
-                plain(shape.text),
-                fontsize=shape.size_pt,
-                horizontalalignment=shape.across,
-                verticalalignment="center_baseline" if shape.along == "center" else shape.along,
-                bbox=_PAPER if shape.halo else None,
-                zorder=2,
+
+def by_segment(names: Iterable[str]) -> tuple[dict[int, list[str]], list[str]]:
+    """Returns names by the segment's number they end in, in ascending order, and those that end in none."""
+    segments: dict[int, list[str]] = defaultdict(list)
+    others = []
+    for name in names:
+        match = _NUMBERED.fullmatch(name)
+        (segments[int(match[2])] if match else others).append(name)
+    return dict(sorted(segments.items())), others
+
+
+def labels_of(network: Network) -> dict[str, str]:
+    """Returns what stands in each neuron: a symbol of the paper, or its role, shortened if it is long."""
+    roles = list(dict.fromkeys(map(role_of, network.neurons)))
+    shown = {
+        role: SYMBOLS.get(role, role if len(role) <= _LONGEST_LABEL else _shortened(role, roles)) for role in roles
+    }
+    numbered = _columns(network)
+    return {name: shown[role_of(name)] if numbered else name for name in network.neurons}
+
+
+def meanings_of(network: Network) -> list[str]:
+    """Returns what labels stand for, ``"U1: contraction"``, of those that are not the names themselves."""
+    return list(
+        dict.fromkeys(
+            f"{label}: {role_of(name)}"
+            for name, label in labels_of(network).items()
+            if label not in (name, role_of(name))
+        )
+    )
+
+
+def _shortened(role: str, roles: Iterable[str]) -> str:
+    """Returns the first three letters of a role, or more where another role begins with these."""
+    others = [other for other in roles if other != role]
+    starts = (role[:n] for n in range(3, len(role)))
+    return next((start for start in starts if not any(other.startswith(start) for other in others)), role)
+
+
+def _columns(network: Network) -> dict[int, list[str]]:
+    """Returns the neurons of each segment, or nothing for a network that is not made of segments."""
+    segments, others = by_segment(network.neurons)
+    return segments if len(others) < len(network.neurons) - len(others) else {}
+
+
+def place_neurons(network: Network) -> dict[str, complex]:
+    """Returns the centre of every neuron.
+
+    The neurons of a segment, whose names end in its number, stand in rows of one column of the picture, in the
+    network's order. Those of no segment stand in a row below, near to the neurons that they are connected with. A
+    network without segments stands on a circle.
+    """
+    columns = _columns(network)
+    if not columns:
+        n = len(network.neurons)
+        radius = 0.65 / np.sin(np.pi / n) if n > 1 else 0.0
+        return {name: radius * np.exp(1j * (np.pi - 2.0 * np.pi * i / n)) for i, name in enumerate(network.neurons)}
+    pitch = _IN_A_ROW - 1 + _COLUMN_GAP
+    places = {
+        name: complex(column * pitch + index % _IN_A_ROW, -(index // _IN_A_ROW))
+        for column, names in enumerate(columns.values())
+        for index, name in enumerate(names)
+    }
+    below = {}
+    for name in by_segment(network.neurons)[1]:
+        ends = [(link.source, link.target) for link in network.connections if name in (link.source, link.target)]
+        below[name] = np.mean([places[end].real for pair in ends for end in pair if end in places] or [0.0])
+    x, y = -1.0, min(place.imag for place in places.values()) - 1.6
+    for name in sorted(below, key=lambda name: below[name]):
+        x = max(below[name], x + 1.0)
+        places[name] = complex(x, y)
+    return {name: places[name] for name in network.neurons}
+
+
+def route_connections(network: Network, places: dict[str, complex]) -> Iterator[Path2D]:
+    """Yields the path of each connection from rim to rim: straight, or bent around other neurons and other paths."""
+    taken: dict[frozenset[str], list[float]] = defaultdict(list)
+    arrived: dict[str, list[complex]] = defaultdict(list)
+    middle = np.mean(list(places.values()))
+    pairs = [frozenset((link.source, link.target)) for link in network.connections]
+    for link, pair in zip(network.connections, pairs, strict=True):
+        start, end = places[link.source], places[link.target]
+        if link.source == link.target:
+            radius = 0.2 + 0.08 * len(taken[pair])
+            outwards = _unit(start - middle) if start != middle else 1.0
+            path = start + outwards * (
+                _RADIUS + 0.6 * radius - radius * np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 121))
             )
+            taken[pair].append(0.0)
         else:
-            patch = Polygon(
-                np.column_stack([shape.points.real, shape.points.imag]),
-                closed=bool(shape.fill),
-                facecolor=shape.fill or "none",
-                edgecolor=shape.color,
-                linewidth=shape.width_pt,
-                linestyle="--" if shape.dashed else "-",
-                joinstyle="miter",
-                gid=shape.key or None,
-                zorder=2,
+            # A bend counts from the same side for both directions, so that two paths never coincide.
+            side = 1.0 if link.source < link.target else -1.0
+            bends = _BENDS if pairs.count(pair) == 1 else _BENDS[1:]
+            free = [bend for bend in bends if side * bend not in taken[pair]] or [1.4 + 0.3 * len(taken[pair])]
+            others = np.array([place for name, place in places.items() if name not in pair])
+            paths = [_bow(start, end, bend) for bend in free]
+            costs = [
+                10 * _n_hit(path, others) + np.sum(_cosines(arrived[link.target], _arrival(path)) > _CROWDED)
+                for path in paths
+            ]
+            best = int(np.argmin(np.array(costs)))
+            path = paths[best]
+            taken[pair].append(side * free[best])
+            arrived[link.target].append(_arrival(path))
+        yield path[(abs(path - start) >= _RADIUS) & (abs(path - end) >= _RADIUS)]
+
+
+def _bow(start: complex, end: complex, bend: float) -> Path2D:
+    """Returns a parabola whose middle is off the straight line by ``bend / 2`` of its length."""
+    share = np.linspace(0.0, 1.0, 481)
+    return (1 - share) * start + share * end + 2.0 * share * (1 - share) * bend * 1j * (end - start)
+
+
+def _n_hit(path: Path2D, others: Path2D) -> int:
+    """Returns the number of neurons that a path runs over."""
+    return int(np.sum(abs(path[::4, np.newaxis] - others).min(axis=0) < 1.25 * _RADIUS)) if others.size else 0
+
+
+def _arrival(path: Path2D) -> complex:
+    """Returns the direction in which a path meets the rim of its target, seen from there."""
+    return _unit(path[abs(path - path[-1]) >= _RADIUS][-1] - path[-1])
+
+
+def _unit(vector: Any) -> complex:
+    return complex(vector / abs(vector))
+
+
+def _cosines(one: Sequence[complex] | Path2D, other: complex) -> NDArray[np.float64]:
+    """Returns the cosines of the angles between some directions and another."""
+    return np.real(np.conj(one) * other)
+
+
+@contextmanager
+def _drawn(network: Network) -> Iterator[Figure]:
+    """Gives a figure with the network, whose unit fits the width of a page."""
+    places = place_neurons(network)
+    with canvas(1.0) as figure:
+        figure.set_layout_engine("none")
+        axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+        axes.set_aspect("equal")
+        axes.axis("off")
+        routes = list(route_connections(network, places))
+        _draw_columns(axes, network, places)
+        for number, (link, route) in enumerate(zip(network.connections, routes, strict=True)):
+            _draw_connection(axes, route, effect_of(network, link), f"connection-{number}")
+        _draw_ends(axes, network, places, routes)
+        axes.update_datalim(
+            [(place.real + s, place.imag + s) for place in places.values() for s in (-_RADIUS, _RADIUS)]
+        )
+        box = axes.dataLim.padded(0.1)
+        unit_in = min(max(WIDTH_IN / box.width, _UNIT_IN[0]), _UNIT_IN[1])
+        figure.set_size_inches(unit_in * box.width, unit_in * box.height)
+        axes.set(xlim=(box.x0, box.x1), ylim=(box.y0, box.y1))
+        _draw_neurons(axes, network, places, unit_in)
+        yield figure
+
+
+def _draw_columns(axes: Axes, network: Network, places: dict[str, complex]) -> None:
+    """Draws the background of each segment, with its name above."""
+    from matplotlib.patches import FancyBboxPatch
+
+    for segment, names in _columns(network).items():
+        x, y = (part([places[name] for name in names]) for part in (np.real, np.imag))
+        width, height = np.ptp(x) + 0.88, np.ptp(y) + 0.88
+        corner = (x.min() - 0.44, y.min() - 0.44)
+        look: dict[str, Any] = {
+            "boxstyle": "round,pad=0,rounding_size=0.2",
+            "facecolor": "#f1f1f1",
+            "edgecolor": "none",
+        }
+        axes.add_patch(FancyBboxPatch(corner, width, height, **look))
+        axes.text(x.mean(), y.max() + _RADIUS + _STUB + 0.1, f"segment {segment}", ha="center", va="bottom", **_PAPER)
+
+
+def _draw_connection(axes: Axes, route: Path2D, effect: Effect, gid: str) -> None:
+    """Draws a path and the mark at its end."""
+    from matplotlib.patches import RegularPolygon
+
+    color, dashes, corners, filled, _ = _LOOKS[effect]
+    tip = route[-1]
+    body = route[abs(route - tip) >= _MARK] if corners else route
+    axes.plot(body.real, body.imag, color=color, linestyle=dashes, linewidth=1.3, snap=False, gid=gid)
+    if corners:
+        forward = _unit(tip - body[-1])
+        middle = tip - _MARK * forward
+        look = {"facecolor": color if filled else "white", "edgecolor": color, "linewidth": 1.2, "zorder": 3}
+        turn = float(np.angle(forward)) - np.pi / 2.0
+        axes.add_patch(RegularPolygon((middle.real, middle.imag), corners, radius=_MARK, orientation=turn, **look))
+
+
+def _draw_ends(axes: Axes, network: Network, places: dict[str, complex], routes: Sequence[Path2D]) -> None:
+    """Draws inputs and outputs as arrows where there is room around their neuron, with their names."""
+    busy: dict[str, list[complex]] = {name: [] for name in places}
+    for link, route in zip(network.connections, routes, strict=True):
+        busy[link.source].append(_unit(route[0] - places[link.source]))
+        busy[link.target].append(_unit(route[-1] - places[link.target]))
+    for name, place in places.items():
+        busy[name] += [_unit(other - place) for other in places.values() if 0.0 < abs(other - place) < 1.2]
+    directions: Path2D = np.exp(1j * np.pi / 8.0 * np.arange(16))
+    outputs = [(name, neuron, 1.0) for name, neuron in network.outputs.items()]
+    inputs = [(name, neuron, -1.0) for name, neurons in network.inputs.items() for neuron in neurons]
+    for name, neuron, upwards in outputs + inputs:
+        nearest = np.max([_cosines(directions, other) for other in busy[neuron]], axis=0, initial=_ROOMY)
+        best = int(np.argmax(0.25 * upwards * directions.imag - nearest))
+        away = complex(directions[best])
+        busy[neuron].append(away)
+        rim, outer = places[neuron] + _RADIUS * away, places[neuron] + (_RADIUS + _STUB) * away
+        tail, head = (rim, outer) if upwards > 0 else (outer, rim)
+        axes.plot([rim.real, outer.real], [rim.imag, outer.imag], linewidth=0.0)
+        arrow = {"arrowstyle": "-|>", "color": _ARROW, "shrinkA": 0.0, "shrinkB": 0.0}
+        axes.annotate("", (head.real, head.imag), (tail.real, tail.imag), arrowprops=arrow)
+        if name != neuron:
+            across = "center" if abs(away.real) < 0.3 else "left" if away.real > 0 else "right"
+            along = "center" if abs(away.imag) < 0.3 else "bottom" if away.imag > 0 else "top"
+            axes.text(
+                outer.real, outer.imag, plain(name.replace("_", " ")), ha=across, va=along, fontsize=8.0, **_PAPER
             )
-            axes.add_patch(patch)
+
+
+def _draw_neurons(axes: Axes, network: Network, places: dict[str, complex], unit_in: float) -> None:
+    """Draws circles, or octagons for neurons that spike, with a double rim for gated channels, and their labels."""
+    from matplotlib.patches import Circle, RegularPolygon
+
+    labels = labels_of(network)
+    for number, (name, place) in enumerate(places.items()):
+        neuron, center = network.neurons[name], (place.real, place.imag)
+        radii = (_RADIUS, 0.84 * _RADIUS) if neuron.channels else (_RADIUS,)
+        for radius, width, face in zip(radii, (1.3, 0.8), ("white", "none"), strict=False):
+            spiking = neuron.firing is not None
+            rim = RegularPolygon(center, 8, radius=radius, orientation=np.pi / 8) if spiking else Circle(center, radius)
+            rim.set(facecolor=face, edgecolor="black", linewidth=width, zorder=4)
+            rim.set_gid(f"neuron-{number}" if radius == _RADIUS else None)
+            axes.add_patch(rim)
+        size = min(9.0, 1.5 * _RADIUS * unit_in * 72.0 / (0.6 * max(len(labels[name]), 1)))
+        axes.text(*center, plain(labels[name]), ha="center", va="center_baseline", fontsize=size, zorder=5)
+
+
+def _draw_key(figure: Figure, network: Network) -> None:
+    """Writes below the network what its symbols mean, of those that it has, and what its labels stand for."""
+    from matplotlib.lines import Line2D
+
+    neurons = network.neurons.values()
+    ring: dict[str, Any] = {
+        "linestyle": "none",
+        "markeredgecolor": "black",
+        "markerfacecolor": "white",
+        "markersize": 11,
+    }
+    entries = [Line2D([], [], marker="o", label="neuron", **ring)]
+    if any(neuron.channels for neuron in neurons):
+        entries.append(Line2D([], [], marker="$\u25ce$", label="neuron with gated channels", **ring))
+    if any(neuron.firing is not None for neuron in neurons):
+        entries.append(Line2D([], [], marker="8", label="spiking neuron", **ring))
+    found = {effect_of(network, link) for link in network.connections}
+    for effect, (color, dashes, _, filled, marker) in _LOOKS.items():
+        if effect in found:
+            look = {"color": color, "linestyle": dashes, "marker": marker, "markevery": [1]}
+            name = effect if "gap" in effect else f"{effect} synapse"
+            entries.append(Line2D([], [], markerfacecolor=color if filled else "white", label=name, **look))
+    if network.inputs or network.outputs:
+        entries.append(Line2D([], [], color=_ARROW, marker=">", markevery=[1], label="input current, output potential"))
+    title = ",  ".join(meanings_of(network))
+    figure.legend(
+        handles=entries,
+        loc="upper left",
+        bbox_to_anchor=(0.0, 0.0),
+        ncols=3,
+        title=plain(title),
+        alignment="left",
+    )

@@ -85,7 +85,7 @@ def turning(
     readings, tracks = [], []
     for gait, modulation, case in cases:
         track, found = track_of(store.run(case)), store[case].summary
-        timed = case.config.controller.kind == "timed"
+        timed = not case.config.controller.sensor_fields
         cycle_s = gait.cycle_s if timed or found.period_s is None else found.period_s
         turn = turn_of(track, cycle_s, after_s=cycle_s)
         readings.append(

@@ -54,7 +54,7 @@ def test_named_files_are_not_replaced_without_force(annelid: Command, run: Path)
         (("--to", "gif", "--every", "2"), "--every has no effect on gif, which takes --from-time, --to-time"),
         (("--to", "mjcf", "--to-time", "1"), "--to-time has no effect on mjcf, which takes the whole run"),
         (("--to", "mat", "-o", "run.csv"), "must end in .mat"),
-        (("--to", "mjcf"), "no MuJoCo model"),
+        (("--to", "mjcf"), "needs the 3D worm"),
         (("--to", "csv", "--signals", "rings"), "no signal 'rings'"),
     ],
 )

@@ -29,7 +29,7 @@ from outcome import Command
         (("export", "--to", "mjcf", "riddle2023-fast", "--fidelity", "preview"), "share their pins"),
         (("run", "nothere.toml"), "cannot read the configuration file nothere.toml"),
         (("run", "--resume", "nothere"), "there is no run file nothere"),
-        (("export", "--to", "mjcf", "riddle2022-planar"), "has no MuJoCo model"),
+        (("export", "--to", "mjcf", "riddle2022-planar"), "needs the 3D worm"),
         (("export-network", "nothere.toml"), "cannot read the configuration file nothere.toml"),
         (("export-network", "crawler-timed"), "only controllers that step a network can"),
         (

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from annelid.analysis.rhombi import actuated, rhombus_plane
-from annelid.body import mesh_of
 from annelid.body.worm import WormBody
 from annelid.config import load_config
 from annelid.draw.camera import picture_axes
@@ -45,7 +44,7 @@ def no_opengl(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def mesh(run: Run) -> MeshGeometry:
     assert isinstance(run.config.body, WormBody)
-    return mesh_of(run.config.body.mesh)
+    return run.config.body.geometry()
 
 
 def check_files(png: Path, *, rendered: bool) -> None:

@@ -15,7 +15,6 @@ from annelid.analysis.muscles import cable_work, muscle_work
 from annelid.analysis.numbers import number, ratio
 from annelid.analysis.rhythm import run_rhythm
 from annelid.analysis.track import first_heading, fitted_circle, forward_position, track_of
-from annelid.body.worm import WormBody
 from annelid.protocols import Array
 from annelid.simulation.runfile import Run
 
@@ -135,7 +134,7 @@ def gait(run: Run) -> Gait:
         cost_of_transport_net=ratio(net_J, push_J),
         cost_of_transport_cables=ratio(cable_work(data), push_J),
         lateral_drift=ratio(float(left.sum()), forwards),
-        heading_change_rad=float(angles[-1] - angles[0]) if isinstance(run.config.body, WormBody) else None,
+        heading_change_rad=None if run.config.body.geometry() is None else float(angles[-1] - angles[0]),
         turning_radius_m=circle.signed_radius_m if circle is not None and circle.is_clear else None,
     )
 
@@ -151,7 +150,7 @@ def _steps(run: Run, marks: Array) -> tuple[Array, Array]:
     time = run.data["time"].values
     centre = run.data["center_of_mass"].sel(axis=["x", "y"]).values
     steps = np.diff(np.array([np.interp(marks, time, along) for along in centre.T]).T, axis=0)
-    if not isinstance(run.config.body, WormBody) or run.data.sizes.get("frame", 0) < 2:
+    if run.config.body.geometry() is None or run.data.sizes.get("frame", 0) < 2:
         return steps, np.broadcast_to(first_heading(run), steps.shape)
     track = track_of(run)
     # Evenly over each cycle, whatever the interval of the frames.

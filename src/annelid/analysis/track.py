@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from annelid.analysis.numbers import finite, number
-from annelid.body.worm import WormBody
 from annelid.errors import RunFileError
 from annelid.morphology import heading_turn
 from annelid.protocols import Array
@@ -23,8 +22,7 @@ _CLEARLY = 3.0
 
 def first_heading(run: Run) -> Array:
     """Returns the direction in which a run's worm leads at the start, seen from above, ``(2,)``."""
-    body = run.config.body
-    heading_deg = body.heading_deg if isinstance(body, WormBody) else 0.0
+    heading_deg = run.config.body.first_heading_deg
     return heading_turn(heading_deg)[:2, :2] @ _FORWARDS if heading_deg else _FORWARDS
 
 
@@ -113,16 +111,15 @@ def track_of(run: Run) -> Track:
     """Reads the track of a 3D worm from its run.
 
     Raises:
-        RunFileError: The run is of another body than the 3D worm, or has fewer than two recorded postures.
+        RunFileError: The run is of a body without a mesh, or has fewer than two recorded postures.
     """
-    body, data = run.config.body, run.data
-    if not isinstance(body, WormBody):
+    geometry, data = run.config.body.geometry(), run.data
+    if geometry is None:
         raise RunFileError(f"{run.path} has no track: only the 3D worm (body.kind = 'worm') records one")
     if data.sizes.get("frame", 0) < 2 or "crossing_position" not in data:
         raise RunFileError(f"{run.path} holds fewer than two recorded postures, and so no track")
-    mesh = body.mesh
-    rings = (mesh.free_planes_at_ends + mesh.planes_between_rings * segment for segment in range(mesh.n_segments))
-    return Track(data["frame_time"].values, data["crossing_position"].values, mesh.n_helices // 2, tuple(rings))
+    rings = tuple(geometry.ring_planes.tolist())
+    return Track(data["frame_time"].values, data["crossing_position"].values, geometry.n_per_plane, rings)
 
 
 @dataclass(frozen=True, slots=True)

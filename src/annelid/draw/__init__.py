@@ -92,4 +92,5 @@ __getattr__, __dir__ = lazy(
         "Mark": "progress_figure takes the values of the trials",
         "Panel": "uncertainty_figure takes the rows of uncertainty.csv",
     },
+    ("annelid_studies.planar",),
 )

@@ -12,14 +12,13 @@ from typing import Any
 import numpy as np
 
 from annelid.analysis import NUMBERS
-from annelid.body.worm import WormBody
 from annelid.config import RunConfig
 from annelid.errors import ConfigError, listed
 from annelid.experiment.case import Case
 from annelid.experiment.outcome import Outcome
 from annelid.experiment.progress import StudyProgress
 from annelid.experiment.store import Done, Store
-from annelid.experiment.variants import ELEMENTS, MOST_ELEMENTS, STEP, finer_steps, more_elements, run_with_variants
+from annelid.experiment.variants import STEP, finer_steps, more_elements, run_with_variants
 from annelid.output import write_json
 from annelid.simulation.lock import locks
 from annelid.simulation.runfile import Run, open_run
@@ -179,13 +178,15 @@ def refinements(config: RunConfig) -> tuple[tuple[Refinement, ...], str]:
         )
     half = finer_steps(config)[0]
     by_step = Refinement(HALF, f"half the step ({1e3 * half[STEP]:g} ms)", half, STEP)
-    if not isinstance(config.body, WormBody):
+    elements, more = config.body.elements, more_elements(config)
+    if elements is None:
         return (by_step,), f"A body of kind {config.body.kind!r} has no elements: only its step is halved."
-    if config.body.formulation.is_papers:
+    if config.body.is_papers:
         return (by_step,), "A chain keeps the paper's elements: only its step is halved."
-    for count in more_elements(config):
-        return (by_step, Refinement(MORE, f"one more element a side ({count})", {ELEMENTS: count}, ELEMENTS)), ""
-    return (by_step,), f"The mesh has {MOST_ELEMENTS} elements a side, the most that are allowed."
+    if not more:
+        return (by_step,), f"The mesh has {elements.most} elements a side, the most that are allowed."
+    words = f"one more element a side ({elements.number + 1})"
+    return (by_step, Refinement(MORE, words, more[0], elements.field)), ""
 
 
 def compare(run: Outcome, finer: Mapping[Refinement, Done], left_out: str = "") -> Check:

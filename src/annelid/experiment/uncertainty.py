@@ -18,7 +18,6 @@ from rich.table import Table
 
 from annelid.analysis import NUMBERS
 from annelid.analysis.numbers import UNKNOWN, Number
-from annelid.body.worm import WormBody
 from annelid.config import RunConfig
 from annelid.draw.figures.experiments import uncertainty_figure
 from annelid.draw.table import framed_table
@@ -27,7 +26,7 @@ from annelid.experiment.outcome import Outcome
 from annelid.experiment.progress import StudyProgress
 from annelid.experiment.spread import UNMEASURED, Spread, applicable, changes, draw, read_spread, scaled_fields
 from annelid.experiment.store import Done
-from annelid.experiment.variants import ELEMENTS, STEP, finer_steps, more_elements, run_with_variants
+from annelid.experiment.variants import STEP, finer_steps, more_elements, run_with_variants
 from annelid.output import write_csv, write_json
 from annelid.simulation.lock import locks
 
@@ -265,7 +264,7 @@ def plan(config: RunConfig, n: int, spread: Spread) -> dict[str, list[dict[str, 
     return {
         "parameters": [changes(config, spread, row) for row in draw(n, spread, config.seed)],
         "time step": [*finer_steps(config)],
-        "elements": [{ELEMENTS: count} for count in more_elements(config)],
+        "elements": [*more_elements(config)],
     }
 
 
@@ -320,11 +319,12 @@ def _remarks(result: Uncertainty) -> list[str]:
         remedy = f"; --vary {names[0]}=0.1 takes one of 10 %" if reason == UNMEASURED else ""
         lines.append(f"not varied: {', '.join(names)} ({reason}{remedy})")
     steps = " and ".join(f"{1e3 * changed[STEP]:g}" for changed, _ in result.variants["time step"])
-    counts = " and ".join(f"{changed[ELEMENTS]}" for changed, _ in result.variants["elements"])
-    assert isinstance(config.body, WormBody)
+    counts = " and ".join(f"{count}" for changed, _ in result.variants["elements"] for count in changed.values())
+    elements = config.body.elements
+    assert elements is not None
     lines.append(
         f"time step: {1e3 * config.clock.physics_timestep_s:g} ms against {steps} ms; "
-        f"elements a side: {config.body.mesh.elements_per_side} against {counts or 'none'}"
+        f"elements a side: {elements.number} against {counts or 'none'}"
     )
     for kind, changed, done in result.runs:
         numbers = {path.rpartition(".")[2]: one for path, one in changed.items() if isinstance(one, int | float)}

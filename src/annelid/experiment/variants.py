@@ -8,7 +8,6 @@ from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
-from annelid.body.worm import WormBody
 from annelid.config import RunConfig
 from annelid.errors import ConfigError, SimulationStopped
 from annelid.experiment.case import Case
@@ -18,7 +17,7 @@ from annelid.experiment.store import Done, Store
 from annelid.output import whole_file
 from annelid.simulation.runfile import FILE_NAME, read_config, refuse_used_folder
 
-STEP, ELEMENTS, MOST_ELEMENTS = "clock.physics_timestep_s", "body.mesh.elements_per_side", 32
+STEP = "clock.physics_timestep_s"
 
 
 def finer_steps(config: RunConfig) -> list[dict[str, float]]:
@@ -41,11 +40,13 @@ def finer_steps(config: RunConfig) -> list[dict[str, float]]:
     return [finer(2), *([finer(4)] if ratio > 1 and ratio % 4 == 0 else [])]
 
 
-def more_elements(config: RunConfig) -> list[int]:
-    """Returns one and two elements a side more than a worm has, as far as that is allowed."""
-    assert isinstance(config.body, WormBody)
-    count = config.body.mesh.elements_per_side
-    return [finer for finer in (count + 1, count + 2) if finer <= MOST_ELEMENTS]
+def more_elements(config: RunConfig) -> list[dict[str, int]]:
+    """Returns what gives a body one and two elements more than it has, as far as that is allowed."""
+    elements = config.body.elements
+    if elements is None:
+        return []
+    counts = range(elements.number + 1, min(elements.number + 2, elements.most) + 1)
+    return [{elements.field: count} for count in counts]
 
 
 def run_with_variants(

@@ -21,9 +21,9 @@ from annelid.analysis import (
     rhombus_plane,
 )
 from annelid.draw import WIDTH_IN, canvas, panel_title, picture_axes, save_both
-from annelid.draw import rhombi as flat_rhombi
 from annelid.morphology import Array, MeshGeometry
 from annelid.simulation import Run
+from annelid_studies.planar import rhombi as flat_rhombi
 from annelid_studies.riddle2023.figures.renderings import (
     Place,
     Posture,

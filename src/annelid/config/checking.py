@@ -108,6 +108,7 @@ REPLACED = {
     "body.strands.joint_damping_Nms_per_rad": "set body.strands.damping_time_s, a joint's damping over its stiffness",
     "body.strands.loss_factor": "set body.strands.damping_time_s to the loss factor over 2 pi times its frequency",
     "body.strands.loss_frequency_Hz": "set body.strands.damping_time_s, as for loss_factor",
+    "body.strands.relative_stiffness": "all strands are alike; segments may differ (body.strands.young_modulus_Pa)",
     "arena.rail_gap_m": "guard rails stand on arena.kind = 'floor' only",
     "arena.posts": "posts stand on arena.kind = 'floor' only",
     "arena.friction_cone": "rods always have elliptic cones, and a chain pyramidal ones",

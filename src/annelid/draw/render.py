@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from annelid.analysis.gait import cycle_marks
-from annelid.analysis.rhombi import nearest_time
+from annelid.analysis.track import nearest_time
 from annelid.draw.canvas import WIDTH_IN, canvas, save
 from annelid.errors import MissingDependency, RunFileError
 from annelid.output import whole_file, with_suffix

@@ -21,12 +21,10 @@ from numpy.typing import NDArray
 from annelid import load_config
 from annelid.experiment import SHEAR_OVER_YOUNG
 from annelid.output import write_csv
+from annelid_lab.calibration import Loop, cable_force, identify, load_identify_study
 from annelid_lab.calibration.kinds.load_frame import FrameTest
 from annelid_lab.calibration.kinds.ring_down import RingDown
 from annelid_lab.calibration.kinds.tensile import Tensile
-from annelid_lab.calibration.load_frame import Loop, cable_force
-from annelid_lab.calibration.report import identify
-from annelid_lab.calibration.study import load_identify_study
 
 ROBOTS = 50
 REACH_M = 0.24
@@ -68,7 +66,7 @@ STUDY: dict[str, Any] = {
         {"kind": "ring-down", "name": "strand", "data": "strand.csv", "length_m": 1.2, "points": 100},
     ],
 }
-HEADS = ("robot", "parameter", "truth", "value", "low", "high", "bootstrap_low", "bootstrap_high")
+HEADS = ("robot", "parameter", "truth", "value", "low", "high")
 
 
 def slow(rng: np.random.Generator, at: NDArray[np.float64], size: float, length: float) -> NDArray[np.float64]:
@@ -140,7 +138,7 @@ def rows_of(number: int) -> list[list[object]]:
         found = identify(load_identify_study(STUDY), folder)
     known = found.intervals
     return [
-        [number, name, truth[name], value, *known.profile[i].tolist(), *known.bootstrap[i].tolist()]
+        [number, name, truth[name], value, *known.profile[i].tolist()]
         for i, (name, value) in enumerate(found.fit.values.items())
     ]
 
@@ -154,10 +152,10 @@ def summary(path: Path) -> list[list[object]]:
         mine = [row for row in rows if name in (row["parameter"], "all")]
         ends = {head: np.array([float(row[head]) for row in mine]) for head in HEADS[2:]}
         truth = ends["truth"]
-        held = [np.mean((ends[f"{s}low"] <= truth) & (truth <= ends[f"{s}high"])) for s in ("", "bootstrap_")]
+        held = np.mean((ends["low"] <= truth) & (truth <= ends["high"]))
         width = np.log(ends["high"] / ends["low"])
         bias = np.mean(np.log(ends["value"] / truth)) / np.mean(width)
-        found.append([name, len(mine), *(f"{value:.3f}" for value in (*held, bias, np.exp(np.median(width) / 2) - 1))])
+        found.append([name, len(mine), *(f"{value:.3f}" for value in (held, bias, np.exp(np.median(width) / 2) - 1))])
     return found
 
 
@@ -174,7 +172,7 @@ def main(path: Path, robots: int = ROBOTS) -> None:
         with path.open("a", encoding="utf-8", newline="") as file:
             csv.writer(file, lineterminator="\n").writerows(rows)
         print(f"robot {number} of {robots}", flush=True)
-    columns = ("parameter", "n", "profile", "bootstrap", "bias", "half_width")
+    columns = ("parameter", "n", "profile", "bias", "half_width")
     print(write_csv(path.with_stem(f"{path.stem}_table"), columns, summary(path)).read_text(encoding="utf-8"))
 
 

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from annelid import load_config
 from annelid.experiment.case import SHEAR_OVER_YOUNG
-from annelid_lab.calibration.load_frame import cable_force, load_frame, read_loop
-from annelid_lab.calibration.study import ROBOT, load_identify_study
+from annelid_lab.calibration import ROBOT, cable_force, load_frame, load_identify_study, read_loop
 
 POINTS = 20
 YOUNG_MODULUS_PA, DRY_FRICTION_NM, CABLE_FRICTION = 0.28e9, 0.0055, 2.3

@@ -15,7 +15,7 @@ import numpy as np
 
 from annelid import load_config
 from annelid.draw.canvas import canvas, save
-from annelid_lab.calibration.load_frame import Loop, load_frame, read_loop
+from annelid_lab.calibration import Loop, load_frame, read_loop
 
 WORM = {"body.mesh.n_segments": 3}
 

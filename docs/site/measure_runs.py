@@ -22,7 +22,7 @@ from typing import Any
 import annelid
 from annelid.output import write_csv
 
-LEFT_OUT = ("name", "onsets_s", "warnings", "real_time_factor")
+LEFT_OUT = ("name", "onsets_s", "warnings", "real_time_factor", "rhythm_reason")
 
 
 def measured(command: str) -> dict[str, Any]:
@@ -41,7 +41,7 @@ def measured(command: str) -> dict[str, Any]:
             done.check_returncode()
         run = annelid.open_run(f"{folder}/run")
         step_s = run.config.clock.physics_timestep_s
-        numbers = {"step_s": step_s, **annelid.summary(run).to_dict(), "gait": annelid.gait(run).to_dict()}
+        numbers = {"step_s": step_s, **annelid.summary(run).to_dict()}
     return {name: value for name, value in _flat(numbers) if name not in LEFT_OUT}
 
 

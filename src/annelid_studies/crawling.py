@@ -42,7 +42,7 @@ COLUMNS = {
     "speed_m_per_s": "speed (m/s)",
     "speed_body_lengths_per_s": "body lengths/s",
     "stride_m": "stride (m)",
-    "period_s": "period (s)",
+    "gait_period_s": "period (s)",
     "slip_ratio": "slip ratio",
     "cost_of_transport": "cost of transport",
     "cost_of_transport_net": "the same, net work",

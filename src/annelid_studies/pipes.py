@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from rich.table import Table as TerminalTable
 
-from annelid.analysis import Passage, gait, passage_of
+from annelid.analysis import Passage, passage_of
 from annelid.draw import canvas, draw_lines, line_looks, panel_title, save_both
 from annelid.experiment import Case, Store
 from annelid.morphology import Array
@@ -129,7 +129,8 @@ def pass_pipes(store: Store, wanted: Sequence[Trial]) -> tuple[list[Reading], Co
     readings, courses = [], {}
     for trial in wanted:
         run = store.run(trial.case)
-        passage, found = passage_of(run), gait(run)
+        passage, found = passage_of(run), store[trial.case].summary
+        work_J = found.energy_muscle_work_J
         path_m = float(passage.middle_m[-1] - passage.middle_m[0])
         readings.append(
             Reading(
@@ -137,8 +138,8 @@ def pass_pipes(store: Store, wanted: Sequence[Trial]) -> tuple[list[Reading], Co
                 passed=passage.passed,
                 speed_m_per_s=passage.speed_m_per_s(),
                 front_m=float(passage.front_m.max()),
-                in_order=store[trial.case].summary.wave,
-                work_J_per_m=None if found.energy is None or path_m <= 0 else found.energy.muscle_work_J / path_m,
+                in_order=found.wave,
+                work_J_per_m=None if work_J is None or path_m <= 0 else work_J / path_m,
                 slip_ratio=found.slip_ratio,
                 command=trial.case.command,
             )

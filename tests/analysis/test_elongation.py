@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from annelid.analysis.summary import end_difference, interior_deficit, middle_deficit
+from annelid.analysis.elongation import end_difference, interior_deficit, middle_deficit
 
 
 def test_deficits_of_the_published_elongations() -> None:

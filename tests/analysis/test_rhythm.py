@@ -34,7 +34,7 @@ def test_a_shifted_and_scaled_wave_gives_its_period_order_and_cycles(
     activation = wave_activation(time, n_segments, period_s, start_s, rise_s=0.02)
     found = rhythm(time, activation)
     onsets = start_s + share_s * np.arange(cycles * n_segments)
-    assert found.order == tuple(range(1, n_segments + 1)) * cycles
+    assert found.order == list(range(1, n_segments + 1)) * cycles
     np.testing.assert_allclose(found.onsets_s, onsets, atol=1e-9)
     assert found.period_s == pytest.approx(period_s, abs=1e-9)
     assert found.period_std_s == pytest.approx(0.0, abs=1e-9)
@@ -61,7 +61,7 @@ def test_a_continued_run_has_no_initial_state() -> None:
     activation = np.stack([pulses(time, 5.0, 8.0, 11.0, 14.0), pulses(time, 6.0, 9.0), pulses(time, 7.0, 10.0)], axis=1)
     activation[0, 0] = activation[1, 0] = 1.0
     found = rhythm(time, activation)
-    assert found.order[:4] == (2, 3, 1, 2)
+    assert found.order[:4] == [2, 3, 1, 2]
     assert found.period_s == pytest.approx(3.0, abs=1e-3)
     assert rhythm(time[:6000], activation[:6000]).wave is True
 
@@ -78,7 +78,7 @@ def test_first_activation_recorded_one_sample_late_is_still_the_initial_state() 
 
 def test_a_silent_worm_has_no_rhythm() -> None:
     found = rhythm(np.arange(10) * 0.1, np.zeros((10, 3)))
-    assert (found.order, found.onsets_s, found.period_s, found.wave, found.full_cycles) == ((), (), None, None, 0)
+    assert (found.order, found.onsets_s, found.period_s, found.wave, found.full_cycles) == ([], [], None, None, 0)
 
 
 def test_wave_and_cycles_of_an_order(subtests: pytest.Subtests) -> None:

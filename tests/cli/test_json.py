@@ -16,7 +16,6 @@ from typer.main import get_command
 
 from annelid.cli import app, entry
 from annelid.output import write_csv, write_json
-from annelid_lab.loop import PseudoRobot, pseudo_robot
 from annelid_studies.riddle2023.contents import Claim, Report, Table
 from outcome import STUDY, Command, Outcome
 
@@ -25,7 +24,6 @@ pytestmark = pytest.mark.usefixtures("runs_in_this_process", "undrawn")
 PAGE = Path(__file__).parents[2] / "docs" / "data_out.md"
 NO_RESULT = {
     "view": "a view goes on until it is closed",
-    "pseudo-robot": "a robot goes on until it is ended",
     "cite": "BibTeX is a format for programs already",
 }
 ROWS = [{"run": "007", "speed_m_per_s": 0.5, "slip": None, "ordered": True, "problem": "silent"}]
@@ -143,10 +141,9 @@ def faked(name: str) -> Callable[[Command, Path, pytest.MonkeyPatch], Outcome]:
 
 
 def loop(annelid: Command, _: Path, monkeypatch: pytest.MonkeyPatch) -> Outcome:
-    with pseudo_robot(PseudoRobot(3, 3)) as path:
-        # Busy tests beside it must not end it.
-        quick = ("--duration", "0.2", "--rate", "20", "--watchdog", "40")
-        return annelid("loop", "riddle2023-rods", "--servos", path, *quick, "--json")
+    # Busy tests beside it must not end it.
+    quick = ("--duration", "0.2", "--rate", "20", "--watchdog", "40")
+    return annelid("loop", "riddle2023-rods", "--pseudo", *quick, "--json")
 
 
 DONE = {
@@ -164,6 +161,7 @@ DONE = {
     "study limit-cycle": typed("study", "limit-cycle", "--time", "located", "-o", "cycle.svg"),
     "list presets": typed("list", "presets"),
     "list arenas": typed("list", "arenas"),
+    "list numbers": typed("list", "numbers"),
     "doctor": typed("doctor"),
     "study load-frame": typed("study", "load-frame", "--displacement", "90"),
     "paper": paper,
@@ -174,7 +172,7 @@ DONE = {
     "sweep": sweep,
     "tune": tune,
 } | {name: faked(name) for name in STUDIES}
-LISTS = {"check", "list runs", "list presets", "list arenas", "doctor"}
+LISTS = {"check", "list runs", "list presets", "list arenas", "list numbers", "doctor"}
 """What prints a list; all others print an object."""
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from annelid.analysis import gait, rhythm_score, summary
+from annelid.analysis import rhythm_score, summary
 from annelid.experiment.case import Case
 from annelid.experiment.outcome import outcome, read_outcome, write_outcome
 from annelid.simulation.loop import simulate
@@ -42,8 +42,7 @@ def test_an_outcome_is_the_runs_own_numbers(held: Run) -> None:
     assert (read.path, read.message) == (held.path.parent, "")
     assert read.summary == summary(held)
     assert read.rhythm == rhythm_score(held)
-    assert read.gait == gait(held)
-    assert read.gait.energy is not None
+    assert read.summary.energy_muscle_work_J is not None
 
 
 def test_another_readers_outcome_is_refused(held: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -55,7 +54,7 @@ def test_another_readers_outcome_is_refused(held: Run, tmp_path: Path, monkeypat
 
 def test_an_incomplete_outcome_is_refused(held: Run, tmp_path: Path) -> None:
     path = tmp_path / "outcome.json"
-    for loss in ("summary", "rhythm", "holds", "message", "gait"):
+    for loss in ("summary", "rhythm", "holds", "message"):
         write_outcome(outcome(held), path)
         content = json.loads(path.read_text())
         del content[loss]

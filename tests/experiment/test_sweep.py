@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import dataclasses
 import json
 import re
 import tempfile
@@ -17,11 +16,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import annelid
-from annelid.analysis import Gait, Summary
-from annelid.analysis.gait import EnergyBalance
 from annelid.config import Study, load_study, unit_of
 from annelid.errors import ConfigError
-from annelid.experiment.numbers import NUMBERS
 from annelid.experiment.space import unit_samples
 from annelid.experiment.sweep import (
     Plan,
@@ -193,15 +189,6 @@ def test_the_unit_is_what_ends_a_fields_name(subtests: pytest.Subtests) -> None:
     ):
         with subtests.test(f"{path!r:.60}"):
             assert unit_of(path) == unit
-
-
-def test_every_number_of_summary_gait_and_balance_is_told() -> None:
-    words = {"name", "status", "order", "onsets_s", "energy", "warnings"}
-    told = set(NUMBERS)
-    for record, prefix in ((Summary, ""), (Gait, ""), (EnergyBalance, "energy_")):
-        own = {field.name for field in dataclasses.fields(record)} - words
-        assert {prefix + name for name in own} <= told
-    assert "gait_period_s" in told
 
 
 REFUSED = [{"field": "body.gain", "values": [1.31, 1e4, -1.0]}, LISTED[0]]

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import log
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -15,7 +14,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from annelid.analysis import RhythmScore, Summary
-from annelid.analysis.gait import Gait
 from annelid.config import load_config
 from annelid.errors import ConfigError
 from annelid.experiment import store as runs
@@ -46,8 +44,8 @@ CONFIG = load_config(PRESET)
 SPEED, SLIP = OBJECTIVES["speed"], OBJECTIVES["slip"]
 
 
-def a_gait(speed: float = 0.1, slip: float = 0.5, cycles: int = 3) -> Gait:
-    return Gait(cycles=cycles, period_s=2.0, speed_m_per_s=speed, cost_of_transport=1.0, slip_ratio=slip)
+def a_gait(speed: float = 0.1, slip: float = 0.5, cycles: int = 3) -> Summary:
+    return Summary(cycles=cycles, gait_period_s=2.0, speed_m_per_s=speed, cost_of_transport=1.0, slip_ratio=slip)
 
 
 def test_ranges_and_choices_are_read() -> None:
@@ -134,7 +132,7 @@ class Toy(Store):
                 gate, tolerance = case.config.controller.gate_time_constant_ms, case.config.sensor.tolerance_m
                 speed = 1.0 - log(gate / 200.0) ** 2 - (tolerance / 0.005 - 1.0) ** 2
                 gait = a_gait(speed, slip=gate / 600.0)
-                found[case_key(case)] = replace(an_outcome(), path=self.path(case), gait=gait)
+                found[case_key(case)] = replace(an_outcome(), path=self.path(case), summary=gait)
         return found
 
 
@@ -217,9 +215,8 @@ def test_a_run_is_on_the_front_once() -> None:
 
 def an_outcome(message: str = "", **changes: Any) -> Outcome:
     """Of a run in order, but for changes of the rhythm and for why it was stopped."""
-    summary = Summary(**dict.fromkeys(Summary.__dataclass_fields__))  # type: ignore[arg-type]
     rhythm = RhythmScore("ordered", "a wave", (1, 2, 3), 1.0, 0.0, 1.0, 1, 1, 1.0, 1.0)
-    return Outcome(Path(), summary, replace(rhythm, **changes), (), message)
+    return Outcome(Path(), Summary(), replace(rhythm, **changes), (), message)
 
 
 def test_what_does_not_walk_is_told_why_and_penalised(subtests: pytest.Subtests) -> None:
@@ -234,7 +231,7 @@ def test_what_does_not_walk_is_told_why_and_penalised(subtests: pytest.Subtests)
         (an_outcome(), a_gait(speed=float("nan")), "does not advance"),
     ):
         with subtests.test(words):
-            judged = judge(replace(outcome, gait=gait))
+            judged = judge(replace(outcome, summary=gait))
             assert judged.problem == words
             assert (judged.gait is None) == bool(outcome.message)
             for objective in OBJECTIVES.values():
@@ -250,8 +247,8 @@ def test_a_gait_that_lives_on_the_integrator_is_none_where_that_is_asked(subtest
         (1e6, 1e-6, ""),
     ):
         with subtests.test(says):
-            energy: Any = SimpleNamespace(numerical_share=share, muscle_work_J=work_J)
-            walking = replace(an_outcome(), gait=replace(a_gait(), energy=energy))
+            gait = replace(a_gait(), energy_numerical_share=share, energy_muscle_work_J=work_J)
+            walking = replace(an_outcome(), summary=gait)
             assert judge(walking).problem == ""
             assert says in (found := judge(walking, 0.3)).problem
             assert SPEED.value(found) == (0.0 if says else 0.1)

@@ -167,8 +167,7 @@ REFUSED = {
     "include": ('<mujoco><include file="/etc/passwd"/></mujoco>', {}, "write its content into the file"),
     "plug-in": ('<mujoco><extension><plugin plugin="x"/></extension></mujoco>', {}, "plug-ins are code"),
     "busy engine": ('<mujoco><option iterations="1000000"/></mujoco>', {}, "at most 10000"),
-    "path in a name": (EXAMPLE.replace('"head"', '"../head"'), {}, "without '/'"),
-    "callback": (EXAMPLE.replace("<position name", "<user name"), {}, "<actuator> has <user>"),
+    "speed as command": (EXAMPLE.replace("<position name", "<velocity name"), {}, "use general, motor, position"),
 }
 
 
@@ -202,6 +201,11 @@ def test_a_composite_that_is_no_cable_is_refused(subtests: pytest.Subtests, tmp_
         (f'<composite type="cable" prefix="c" vertex="{"1 " * 900}"/>', "of each of 3 to 180 places"),
         ('<composite type="cable" prefix="c" vertex="0" quat="1 0 0 0"/>', "<composite quat=..>: a cable cannot"),
         ('<composite type="cable" prefix="c" vertex="0"><plugin plugin="x"/></composite>', "others are code"),
+        (
+            f'<composite type="cable" prefix="c" vertex="{"1 " * 9}"><plugin plugin="mujoco.elasticity.cable">'
+            '<config key="flat" value="true"/></plugin></composite>',
+            "'flat'>: a cable cannot have it",
+        ),
     ):
         with subtests.test(f"{text!r:.60}"):
             folder = Path(tempfile.mkdtemp(dir=tmp_path))

@@ -44,8 +44,6 @@ WITH: dict[str, tuple[str, ...]] = {
     "calibrate": ("nothere.toml",),
     "export-network": ("riddle2023-rods", "-o", "c"),
     "loop": ("riddle2022-planar", "--servos", "/no/such/port", "-o", "out"),
-    "pseudo-robot --duration": ("riddle2022-planar", "--lag", "nan"),
-    "pseudo-robot": ("riddle2022-planar", "--duration", "0.1"),
     "study": ("--scheduler", "nothing"),
     "study load-frame": ("riddle2022-planar",),
 }

@@ -18,7 +18,7 @@ from annelid.experiment.spread import read_spread
 from annelid.nervous import GapJunction, Gate, ModulatorySynapse, Neuron, SpikingSynapse, Synapse
 from annelid.nervous.neurons import Channel, Firing
 from annelid.textfiles import MOST_BYTES, parse_toml
-from annelid_lab.calibration.load_frame import read_loop
+from annelid_lab.calibration import read_loop
 from annelid_studies.robustness import read_judged
 
 LONGEST_S = 20.0

@@ -9,13 +9,16 @@ from typing import TYPE_CHECKING
 
 from annelid.analysis.gait import Gait, gait
 from annelid.analysis.rhythm import RhythmScore, lengthening_score, rhythm_score
-from annelid.analysis.summary import Summary, summary
+from annelid.analysis.summary import NUMBERS, Summary, summary
 from annelid.lazy import lazy
 
 if TYPE_CHECKING:
     from annelid.analysis.comparison import compare
+    from annelid.analysis.elongation import end_difference, interior_deficit, middle_deficit
+    from annelid.analysis.energy import Energy, energy_balance
     from annelid.analysis.gait import SlipCost, slip_cost
     from annelid.analysis.interval import CONFIDENCE, Estimate, mean_and_interval
+    from annelid.analysis.numbers import Number
     from annelid.analysis.paper import (
         PAPER_ELONGATION_M,
         PAPER_END_DIFFERENCE,
@@ -42,21 +45,23 @@ if TYPE_CHECKING:
         segment_activation,
         stretches,
     )
-    from annelid.analysis.summary import end_difference, interior_deficit, middle_deficit
     from annelid.analysis.track import Track, forward_position, track_of, turn_of
 
 __all__ = [
     "CONFIDENCE",
     "CONTRACTED",
     "DESIGN_INTERVAL_S",
+    "NUMBERS",
     "PAPER_ELONGATION_M",
     "PAPER_END_DIFFERENCE",
     "PAPER_MIDDLE_DEFICIT",
     "ROBOT_ELONGATION_M",
     "SHORTEST_S",
     "Deformation",
+    "Energy",
     "Estimate",
     "Gait",
+    "Number",
     "Passage",
     "RhythmScore",
     "SlipCost",
@@ -68,6 +73,7 @@ __all__ = [
     "deformation",
     "distance_from_ring_m",
     "end_difference",
+    "energy_balance",
     "forward_position",
     "gait",
     "interior_deficit",

@@ -6,14 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from annelid.analysis.gait import gait
-from annelid.analysis.summary import summary
+from annelid.analysis.numbers import Value
+from annelid.analysis.summary import NUMBERS, summary
 from annelid.config import RunConfig, field_value, fields_of
 from annelid.simulation.runfile import Run
 
-Number = float | Sequence[float | None] | None  # one number, one per segment, or None for what a run does not have
-
-_NOT_NUMBERS = ("name", "status", "n_segments", "wave", "order", "onsets_s", "warnings")
+COMPARED = tuple(name for name, one in NUMBERS.items() if one.in_sweeps and name not in ("n_segments", "wave"))
+"""Numbers that are laid side by side."""
 # Fields of the configuration that change nothing in a run.
 _WORDS = ("name", "summary", "published")
 
@@ -28,10 +27,10 @@ class Comparison:
     paths: tuple[str, ...]
     statuses: tuple[str, ...]
     orders: tuple[tuple[int, ...], ...]  # segments (from 1) in the order of their contractions
-    numbers: Mapping[str, tuple[Number, ...]]  # fields of Summary and of Gait (gait.speed_m_per_s), SI units
+    numbers: Mapping[str, tuple[Value, ...]]  # by name, SI units
     fields: Mapping[str, tuple[Any, ...]]  # of the configuration in which they differ
 
-    def differences(self, field: str) -> list[Number]:
+    def differences(self, field: str) -> list[Value]:
         """Returns the `relative_difference` of each run's number to the first run's; None for the first."""
         first, *others = self.numbers[field]
         return [None, *(relative_difference(first, other) for other in others)]
@@ -52,20 +51,12 @@ class Comparison:
 def compare(runs: Sequence[Run]) -> Comparison:
     """Lays runs of any kinds of worm side by side; the first is what the others are compared with."""
     summaries = [summary(run) for run in runs]
-    rows: list[dict[str, Number]] = []
-    for one, run in zip(summaries, runs, strict=True):
-        walking = gait(run).to_dict()
-        energy = walking.pop("energy") or {}
-        rows.append({field: value for field, value in one.to_dict().items() if field not in _NOT_NUMBERS})
-        rows[-1] |= {f"gait.{field}": value for field, value in walking.items()}
-        rows[-1] |= {f"gait.energy.{part}": share for part, share in energy.items()}
-    names = list(dict.fromkeys(field for row in rows for field in row))
     return Comparison(
         labels=run_labels(runs),
         paths=tuple(str(run.path) for run in runs),
         statuses=tuple(run.status for run in runs),
         orders=tuple(tuple(one.order) for one in summaries),
-        numbers={field: tuple(row.get(field) for row in rows) for field in names},
+        numbers={name: tuple(getattr(one, name) for one in summaries) for name in COMPARED},
         fields=differing_fields([run.config for run in runs]),
     )
 
@@ -80,7 +71,7 @@ def run_labels(runs: Sequence[Run]) -> tuple[str, ...]:
     return tuple(f"{part[-1]} ({number})" for number, part in enumerate(parts, start=1))
 
 
-def relative_difference(first: Number, other: Number) -> Number:
+def relative_difference(first: Value, other: Value) -> Value:
     """Returns ``(other - first) / |first|``, by segment; None where either is None, the first 0, or lengths differ."""
     if first is None or other is None:
         return None

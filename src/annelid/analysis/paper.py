@@ -9,7 +9,7 @@ from importlib import resources
 from typing import Any
 
 from annelid.analysis.comparison import differing_fields, relative_difference
-from annelid.analysis.summary import Summary
+from annelid.analysis.summary import NUMBERS, Summary
 from annelid.body.worm import WormBody
 from annelid.config import RunConfig, load_config, preset_names
 from annelid.config.run import published_worms
@@ -102,7 +102,7 @@ def formulation() -> Summary:
     """Returns the numbers of the paper's own formulation, from our run of the preset `FORMULATION`."""
     text = (resources.files("annelid") / "data" / f"{FORMULATION}.json").read_text(encoding="utf-8")
     numbers = parse_json(text, f"{FORMULATION}.json")
-    return Summary(**{field: value for field, value in numbers.items() if field in Summary.__slots__})
+    return Summary(**{field: value for field, value in numbers.items() if field in NUMBERS})
 
 
 def references(config: RunConfig) -> dict[str, Published]:

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from annelid.analysis.numbers import number
 from annelid.control.sns import paper_controller
 from annelid.protocols import Array
 from annelid.simulation.runfile import Run
 
 CONTRACTED = 0.5  # activation above which a muscle counts as contracted (half of its range)
+LEAST_SEGMENTS = 3  # that can have a rhythm
 SHORTEST_S = 0.02  # contractions, and interruptions of one, that are shorter do not count in a score, s
 LEAST_LENGTHENING_M = 0.0025  # segments that lengthen by less than twice this are not moved, m
 DESIGN_INTERVAL_S = 0.875
@@ -31,16 +33,19 @@ _DESIGN_GATE_MS = 300.0
 Verdict = Literal["ordered", "disordered", "silent"]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, kw_only=True)
 class Rhythm:
-    """The rhythm of a run."""
+    """When which segment contracts. The numbers whose name begins with ``rhythm_`` are those of `RhythmScore`."""
 
-    order: tuple[int, ...]  # segments (from 1) in the order of their contractions
-    onsets_s: tuple[float, ...]  # of these contractions
-    period_s: float | None  # mean interval between successive onsets of the same segment; None if none repeats
-    period_std_s: float | None  # standard deviation of those intervals; None with fewer than two
-    wave: bool | None  # whether the order is 1-2-..-N over and over; None while it is, but for less than one cycle
-    full_cycles: int  # how many times N successive onsets ran 1-2-..-N
+    order: list[int] = number("segments, from 1, in the order of their contractions", in_sweeps=False, factory=list)
+    onsets_s: list[float] = number("times of those contractions", in_sweeps=False, factory=list)
+    wave: bool | None = number("whether the order is 1-2-..-N over and over; in a sweep 1 or 0")
+    full_cycles: int = number("how many times N successive onsets ran 1-2-..-N", default=0)
+    period_s: float | None = number("mean interval between successive contractions of a segment", "period", 1.0, 3, "s")
+    period_std_s: float | None = number("standard deviation of those intervals")
+    rhythm_verdict: Verdict | None = number("ordered, disordered or silent; none if too short", in_sweeps=False)
+    rhythm_reason: str | None = number("why, in a short phrase", in_sweeps=False)
+    rhythm_regularity: float | None = number("how even the lags between neighbours are: 1 for an even wave")
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,10 +149,10 @@ def rhythm(time_s: ArrayLike, activation: ArrayLike) -> Rhythm:
     signals = np.asarray(activation, dtype=float)
     _, onsets, started = _onsets(times, signals)
     events, periods = _in_order(onsets), _intervals(onsets, started)
-    order = tuple(segment for _, segment in events)
+    order = [segment for _, segment in events]
     return Rhythm(
         order=order,
-        onsets_s=tuple(onset for onset, _ in events),
+        onsets_s=[onset for onset, _ in events],
         period_s=float(periods.mean()) if periods.size else None,
         period_std_s=float(periods.std()) if periods.size > 1 else None,
         wave=is_wave(order, signals.shape[1], any_start=started == -np.inf),
@@ -155,15 +160,24 @@ def rhythm(time_s: ArrayLike, activation: ArrayLike) -> Rhythm:
     )
 
 
-def run_rhythm(run: Run) -> Rhythm | None:
-    """Describes the rhythm in which a run's muscles are activated; None without samples of activation."""
+def run_rhythm(run: Run) -> Rhythm:
+    """Describes the rhythm in which a run's muscles are activated, without its score; empty without samples of it."""
     data = run.data
     if "activation" not in data or not data.sizes.get("time"):
-        return None
+        return Rhythm()
     return rhythm(data["time"].values, segment_activation(data["activation"].values, run.config.body.n_segments))
 
 
-def is_wave(order: tuple[int, ...], n_segments: int, any_start: bool = False) -> bool | None:
+def scored_rhythm(run: Run) -> Rhythm:
+    """Describes the rhythm of a run with the score of the whole of it, where there is one."""
+    found = run_rhythm(run)
+    if "activation" not in run.data or run.config.body.n_segments < LEAST_SEGMENTS:
+        return found
+    score = rhythm_score(run)
+    return replace(found, rhythm_verdict=score.verdict, rhythm_reason=score.reason, rhythm_regularity=score.regularity)
+
+
+def is_wave(order: Sequence[int], n_segments: int, any_start: bool = False) -> bool | None:
     """Whether an order of contraction is 1-2-..-N repeated, from 1 or from any segment on; None if too short."""
     start = order[0] - 1 if order and any_start else 0
     if any(segment != (start + i) % n_segments + 1 for i, segment in enumerate(order)):
@@ -171,10 +185,10 @@ def is_wave(order: tuple[int, ...], n_segments: int, any_start: bool = False) ->
     return True if len(order) >= n_segments else None
 
 
-def full_cycles(order: tuple[int, ...], n_segments: int) -> int:
+def full_cycles(order: Sequence[int], n_segments: int) -> int:
     """Counts the stretches of N successive onsets that run 1-2-..-N."""
-    cycle = tuple(range(1, n_segments + 1))
-    return sum(order[i : i + n_segments] == cycle for i in range(len(order)))
+    cycle = list(range(1, n_segments + 1))
+    return sum(list(order[i : i + n_segments]) == cycle for i in range(len(order)))
 
 
 def rhythm_score(run: Run, after_s: float = 0.0) -> RhythmScore:
@@ -265,8 +279,8 @@ def score(time_s: ArrayLike, activation: ArrayLike, interval_s: float = DESIGN_I
     times = np.asarray(time_s, dtype=float)
     values = np.asarray(activation, dtype=float)
     n = values.shape[1]
-    if n < 3:
-        raise ValueError(f"a rhythm needs at least 3 segments, not {n}")
+    if n < LEAST_SEGMENTS:
+        raise ValueError(f"a rhythm needs at least {LEAST_SEGMENTS} segments, not {n}")
     found, onsets, started = _onsets(times, values, SHORTEST_S)
     events, periods = _in_order(onsets), _intervals(onsets, started)
     judged = [of_segment[of_segment > started] for of_segment in onsets]

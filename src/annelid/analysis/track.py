@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
+from annelid.analysis.numbers import finite, number
 from annelid.body.worm import WormBody
 from annelid.errors import RunFileError
 from annelid.morphology import heading_turn
@@ -33,6 +34,26 @@ def forward_position(run: Run) -> Array:
     along: Array = ahead[0] * centre.sel(axis="x").values
     # A planar worm moves along x alone.
     return along + ahead[1] * centre.sel(axis="y").values if ahead[1] else along
+
+
+@dataclass(frozen=True, kw_only=True)
+class Travel:
+    """How far a worm came, along its initial heading."""
+
+    travel_m: float | None = number(
+        "displacement of the centre of mass, negative backwards", "travel forwards, centre of mass", 1000.0, 1, "mm"
+    )
+    travel_path_m: float | None = number(
+        "length of its path forwards and backwards", "travel, forth and back", 1000.0, 1, "mm"
+    )
+
+
+def travel(run: Run) -> Travel:
+    """Reads the travel of a run; None for a worm that stays in its place or was not recorded."""
+    if "center_of_mass" not in run.data or not run.data.sizes.get("time"):
+        return Travel()
+    ahead = forward_position(run)
+    return Travel(travel_m=finite(ahead[-1] - ahead[0]), travel_path_m=finite(np.abs(np.diff(ahead)).sum()))
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 from annelid.lazy import lazy
 
 if TYPE_CHECKING:
-    from annelid.arena.grammar import ROBOT
     from annelid.arena.kinds.floor import Floor, Ground
-    from annelid.arena.mjcf import names_in, read_mjcf, stated_in, validator
+    from annelid.arena.mjcf import ROBOT, names_in, stated_in, validator
+    from annelid.arena.mjcf_files import read_mjcf
     from annelid.arena.surface import Implicit, Level, Nearest, Plane, Surface
 
 __all__ = [

@@ -278,13 +278,6 @@ def print_paths(paths: Iterable[Path]) -> None:
             typer.echo(path)
 
 
-def numbers_of(run: Run) -> dict[str, Any]:
-    """Returns all numbers of a run, as --json prints them."""
-    from annelid.analysis import gait, summary
-
-    return summary(run).to_dict() | {"gait": gait(run).to_dict()}
-
-
 def print_run(run: Run, *, quiet: bool = False, check: Check | None = None) -> None:
     """Prints the numbers of a run unless it is to be quiet, those to compare with beside them, and what follows.
 
@@ -295,17 +288,15 @@ def print_run(run: Run, *, quiet: bool = False, check: Check | None = None) -> N
         quiet: Whether nothing is printed.
         check: What finer runs have found.
     """
-    from annelid.analysis import gait, summary
+    from annelid.analysis import summary
     from annelid.draw.table import closing_sentence, summary_table
     from annelid.terminal import Console
 
-    if wants_json():
-        checked = {} if check is None else {"check.json": check.to_dict()}
-        give_files([run.path], {run.path.name: numbers_of(run), **checked})
-    if quiet or wants_json():
-        return
     numbers = summary(run)
-    Console().print(summary_table(numbers, run.config, gait(run), None if check is None else check.cell))
+    checked = {} if check is None else {"check.json": check.to_dict()}
+    if give_files([run.path], {run.path.name: numbers.to_dict(), **checked}) or quiet:
+        return
+    Console().print(summary_table(numbers, run.config, None if check is None else check.cell))
     for doubt in run.warnings:
         typer.echo(f"warning: {doubt}")
     if closing := closing_sentence(numbers, run.config):

@@ -43,6 +43,7 @@ PANELS = ("Make", "See", "Vary", "Exchange", "Robot", "Studies", "Help")
 _OLD: Mapping[str, tuple[str, ...]] = {
     "build": ("export", "--to", "mjcf"),
     "experiment": ("study",),
+    "pseudo-robot": ("loop", "--pseudo"),
     **dict.fromkeys(("plot", "render"), ("draw",)),
     **{name: ("list", name) for name in ("presets", "arenas", "runs")},
     **{name: ("study", name) for name in ("limit-cycle", "bench", "robustness", "challenge", "gallery")},
@@ -173,7 +174,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
 )
-lists = typer.Typer(cls=_Panels, no_args_is_help=True, help="List presets, arenas or runs.")
+lists = typer.Typer(cls=_Panels, no_args_is_help=True, help="List presets, arenas, numbers or runs.")
 app.add_typer(lists, name="list", rich_help_panel="Make")
 studies = typer.Typer(cls=_Panels, no_args_is_help=True, help="Do one of the studies that the pages report.")
 app.add_typer(studies, name="study", rich_help_panel="Studies")

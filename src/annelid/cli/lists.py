@@ -1,17 +1,21 @@
-"""The commands `list ..`: presets, arenas, and the runs that are there, which it removes where the user names them."""
+"""The commands `list ..`: presets, arenas, the numbers of a run, and runs, which it removes where the user says so."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from annelid.cli.common import FIRST_PRESET
 from annelid.cli.entry import complain, listing
-from annelid.cli.result import give, refuse_json, wants_json
+from annelid.cli.result import give, refuse_json
 from annelid.errors import ConfigError, listed
+
+if TYPE_CHECKING:
+    from annelid.config import RunConfig
 
 
 @listing("presets")
@@ -31,23 +35,53 @@ def presets_command(
     annelid list presets riddle2023 --fields
     """
     from annelid.config import load_config, preset_names, preset_text
-    from annelid.draw.table import field_lines, presets_table
-    from annelid.terminal import Console
 
     refuse_json(name is not None or fields, "a name or --fields")
-    if wants_json():
-        known = [load_config(each) for each in preset_names()]
-        rows = [(c.name, c.summary, c.body.n_segments, c.duration_s) for c in known]
-        keys = ("name", "summary", "n_segments", "duration_s")
-        give([dict(zip(keys, each, strict=True)) for each in rows])
-        return
-    if name is not None and not fields:
-        typer.echo(preset_text(name), nl=False)
-        return
     if fields:
-        typer.echo("\n".join(field_lines(load_config(FIRST_PRESET if name is None else name))))
-        return
-    Console().print(presets_table([load_config(each) for each in preset_names()]))
+        typer.echo("\n".join(_field_lines(load_config(FIRST_PRESET if name is None else name))))
+    elif name is not None:
+        typer.echo(preset_text(name), nl=False)
+    else:
+        known = [load_config(each) for each in preset_names()]
+        keys = ("name", "summary", "n_segments", "duration_s")
+        rows = [(one.name, one.summary, one.body.n_segments, one.duration_s) for one in known]
+        if not give([dict(zip(keys, row, strict=True)) for row in rows]):
+            shown = ((*row[:2], str(row[2]), f"{row[3]:g} s") for row in rows)
+            _print_table(("preset", "what it is", "segments", "simulated"), shown)
+
+
+def _field_lines(config: RunConfig) -> list[str]:
+    """Returns one line for every field of a configuration: path, value as TOML writes it, and what it means."""
+    from annelid.config import field_value, fields_of, toml_value
+
+    lines = []
+    for path, meaning in fields_of(config).items():
+        value = field_value(config, path)
+        setting = f"{path} (not set)" if value is None else f"{path} = {toml_value(value)}"
+        lines.append(f"{setting:<60}{'  # ' if meaning else ''}{meaning}".rstrip())
+    return lines
+
+
+@listing("numbers")
+def numbers_command() -> None:
+    """List the numbers of a run: name, unit, and what each is.
+
+    A name is the same in `annelid show --json`, in the files of a sweep, in tables as CSV, and in Python:
+    annelid.summary(run).period_s. Of a number for each segment there is a list. A sweep may output all but those that
+    are marked as words.
+
+    \b
+    annelid list numbers
+    annelid list numbers --json
+    """
+    from annelid.analysis import NUMBERS
+
+    keys = ("name", "unit", "section", "meaning", "per_segment", "in_sweeps")
+    rows = [(n.name, n.unit, n.section.__name__, n.meaning, n.per_segment, n.in_sweeps) for n in NUMBERS.values()]
+    if not give([dict(zip(keys, row, strict=True)) for row in rows]):
+        marks = (("per segment" if each else "", "" if swept else "words") for *_, each, swept in rows)
+        shown = ((*row[:2], ", ".join(filter(None, mark)), row[3]) for row, mark in zip(rows, marks, strict=True))
+        _print_table(("number", "unit", "", "what it is"), shown)
 
 
 @listing("arenas")
@@ -64,8 +98,6 @@ def arenas_command(
     annelid run --arena my_pipe.toml --set arena.radius=0.8
     """
     from annelid.config import arena_names, arena_summary, arena_text
-    from annelid.draw.table import arenas_table
-    from annelid.terminal import Console
 
     refuse_json(name is not None, "a name")
     if name is not None:
@@ -73,7 +105,18 @@ def arenas_command(
         return
     summaries = {each: arena_summary(each) for each in arena_names()}
     if not give([{"name": each, "summary": summary} for each, summary in summaries.items()]):
-        Console().print(arenas_table(summaries))
+        _print_table(("arena", "what it is"), summaries.items())
+
+
+def _print_table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+    from rich.table import Table
+
+    from annelid.terminal import Console
+
+    table = Table(*headings, box=None, pad_edge=False)
+    for row in rows:
+        table.add_row(*row)
+    Console().print(table)
 
 
 @listing("runs")

@@ -17,7 +17,6 @@ from annelid.cli.common import (
     Segments,
     config_of,
     names_worm,
-    numbers_of,
     overrides_of,
     play,
     print_paths,
@@ -26,7 +25,7 @@ from annelid.cli.common import (
     worms_from,
 )
 from annelid.cli.entry import command, lock
-from annelid.cli.result import give, refuse_json, wants_json
+from annelid.cli.result import give, refuse_json
 from annelid.errors import ConfigError, RunFileError, suggest
 
 if TYPE_CHECKING:
@@ -53,6 +52,7 @@ def show_command(
     annelid show runs/riddle2023-001 --json | jq .period_s
     annelid show runs/riddle2023-001 --verify
     """
+    from annelid.analysis import summary
     from annelid.simulation.runfile import open_run, verify_run
 
     refuse_json(verify, "--verify")
@@ -60,8 +60,7 @@ def show_command(
         typer.echo(verify_run(run))
         return
     opened = open_run(run)
-    if wants_json():
-        give(numbers_of(opened))
+    if give(summary(opened).to_dict()):
         return
     print_run(opened)
     if opened.message:

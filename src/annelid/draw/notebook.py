@@ -9,19 +9,20 @@ from mimetypes import guess_type
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from annelid.analysis import gait, summary
+from annelid.analysis import summary
 from annelid.draw.figures import RUN_FIGURES
 from annelid.draw.gallery import VIDEO_TASK, frame_time_s, task_bar
 from annelid.draw.plots import figure7, plot_path
 from annelid.draw.render import VIDEO_SIZE, render_frame, render_video
-from annelid.draw.table import COMPARED, closing_sentence, gait_rows, legend, summary_rows
+from annelid.draw.table import COMPARED, closing_sentence, legend, summary_rows
 from annelid.errors import AnnelidError
 from annelid.simulation.runfile import VIEWS, Run, open_run
 from annelid.text import printable
 
 VIDEO_NAME = "video.mp4"
-HEADLINES = ("order", "wave", "period_s", "elongation_first_helix_pp_m", "elongation_mean_max_m", "travel_m")
-"""Fields of the summary that are shown; speed and stride follow."""
+ELONGATIONS = ("elongation_first_helix_pp_m", "elongation_mean_max_m")
+HEADLINES = ("order", "wave", "period_s", *ELONGATIONS, "travel_m", "speed_m_per_s", "stride_m")
+"""Numbers of a run that are shown."""
 MOST_BYTES = 12_000_000
 """Largest file that is put into a page."""
 _LEFT = 'style="text-align:left"'
@@ -148,13 +149,10 @@ def _still(run: Run) -> str:
 
 
 def _numbers(run: Run) -> str:
-    numbers, locomotion = summary(run), gait(run)
+    numbers = summary(run)
     beside = legend(numbers, run.config)
     header = ("quantity", "this run", *(COMPARED if beside else ()))
-    rows = [
-        *summary_rows(numbers, run.config, HEADLINES),
-        *gait_rows(locomotion)[: 2 * (locomotion.speed_m_per_s is not None)],
-    ]
+    rows = summary_rows(numbers, run.config, HEADLINES)
     lines = "".join(
         f"<tr>{''.join(f'<td {_LEFT}>{_words(cell)}</td>' for cell in row[: len(header)])}</tr>" for row in rows
     )

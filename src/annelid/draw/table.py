@@ -1,15 +1,15 @@
-"""Tables in the terminal: a run's numbers, runs side by side, presets and arenas."""
+"""Tables in the terminal: a run's numbers beside those to compare with, and runs side by side."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Collection, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rich import box
 from rich.table import Table
 
-from annelid.analysis.comparison import LACKING, Comparison, Number, relative_difference
-from annelid.analysis.gait import Gait
+from annelid.analysis.comparison import LACKING, Comparison, relative_difference
+from annelid.analysis.numbers import UNKNOWN, Value
 from annelid.analysis.paper import (
     ELONGATION_WITHIN,
     FORMULATION,
@@ -22,15 +22,14 @@ from annelid.analysis.paper import (
     references,
     stands_for_the_papers,
 )
-from annelid.analysis.summary import Summary
+from annelid.analysis.summary import NUMBERS, Summary
 from annelid.body.worm import WormBody
-from annelid.config import field_value, fields_of, toml_value
+from annelid.config import toml_value
 from annelid.errors import listed, shortened
 
 if TYPE_CHECKING:
     from annelid.config import RunConfig
 
-UNKNOWN = "-"
 MOST_CHARACTERS = 400
 """Of a value in a table of fields; a scene has up to a million."""
 _ONSETS_SHOWN = 12
@@ -40,54 +39,23 @@ NEXT = (
     "riddle2023-rods (rigid crossings), wang (the robot)"
 )
 """What to run after the first worm."""
-
-Row = tuple[str, float, int, str]
-SUMMARY_ROWS: dict[str, Row] = {
-    "period_s": ("period", 1.0, 3, "s"),
-    "elongation_first_helix_pp_m": ("elongation, first helix, pp", 100.0, 2, "cm"),
-    "elongation_least_pp_m": ("least of its sensors, pp", 100.0, 2, "cm"),
-    "elongation_most_pp_m": ("most of its sensors, pp", 100.0, 2, "cm"),
-    "elongation_mean_max_m": ("elongation, mean, maximum", 100.0, 2, "cm"),
-    "middle_deficit": ("middle below first, pp", 100.0, 1, "%"),
-    "middle_deficit_mean": ("middle below first, mean", 100.0, 1, "%"),
-    "end_difference": ("last below first, pp", 100.0, 1, "%"),
-    "contraction_force_median_N": ("force contracted, median", 1.0, 2, "N"),
-    "contraction_force_peak_N": ("force contracted, peak", 1.0, 2, "N"),
-    "segment_force_median_N": ("of each segment, median", 1.0, 2, "N"),
-    "segment_force_peak_N": ("of each segment, peak", 1.0, 2, "N"),
-    "positive_work_J": ("positive work of each segment", 1.0, 2, "J"),
-    "muscle_work_J": ("net work of each segment", 1.0, 2, "J"),
-    "travel_m": ("travel forwards, centre of mass", 1000.0, 1, "mm"),
-    "travel_path_m": ("travel, forth and back", 1000.0, 1, "mm"),
-    "ring_length_min_m": ("shortest ring", 100.0, 1, "cm"),
-    "edge_strain_max": ("largest edge strain", 100.0, 3, "%"),
-    "pin_gap_max_m": ("largest pin gap", 1000.0, 2, "mm"),
-    "real_time_factor": ("times real time", 1.0, 3, ""),
+_IN_BRACKETS = {
+    "period_s": ("period_std_s", "std {}"),
+    "speed_m_per_s": ("speed_body_lengths_per_s", "{}"),
+    "stride_m": ("stride_body_lengths", "{}"),
 }
-"""Field of the summary: what it is called, what it is multiplied by, digits, unit."""
+"""Numbers behind which another is printed in brackets."""
+_NO_ROW = {"duration_s", "energy_slip_J", *(name for name, _ in _IN_BRACKETS.values())}
+"""Numbers without a row of their own in the table of a run, which has them elsewhere."""
 
-GAIT_ROWS: dict[str, Row] = {
-    "slip_ratio": ("slip ratio", 100.0, 1, "%"),
-    "backward_ratio": ("travel backwards", 100.0, 1, "%"),
-    "cost_of_transport": ("cost of transport, positive work", 1.0, 2, ""),
-    "cost_of_transport_net": ("cost of transport, net work", 1.0, 2, ""),
-    "lateral_drift": ("drift to the left per travel", 100.0, 1, "%"),
-}
-"""The same of the gait."""
 
-COMPARISON_ROWS: dict[str, Row] = {
-    "duration_s": ("simulated time", 1.0, 3, "s"),
-    **SUMMARY_ROWS,
-    "gait.speed_m_per_s": ("speed", 100.0, 2, "cm/s"),
-    "gait.speed_body_lengths_per_s": ("speed", 1.0, 3, "body lengths/s"),
-    "gait.stride_m": ("stride", 100.0, 1, "cm"),
-    "gait.contact_duty": ("on the ground", 100.0, 0, "%"),
-    **{f"gait.{field}": row for field, row in GAIT_ROWS.items()},
-    "gait.turning_radius_m": ("turning radius, left positive", 1.0, 2, "m"),
-    "gait.energy.muscle_work_J": ("muscles' net work, whole run", 1.0, 2, "J"),
-    "gait.energy.slip_J": ("lost to slip, whole run", 1.0, 2, "J"),
-}
-"""The same of a comparison."""
+class Row(NamedTuple):
+    """One row of a run's table, as text: what it is, our number, the one to compare with, and how far ours is off."""
+
+    label: str
+    ours: str
+    reference: str = ""
+    deviation: str = ""
 
 
 def framed_table(*headings: str, title: str | None = None, caption: str | None = None, min_width: int = 0) -> Table:
@@ -115,13 +83,13 @@ def framed_table(*headings: str, title: str | None = None, caption: str | None =
     return table
 
 
-def summary_table(
-    numbers: Summary, config: RunConfig, locomotion: Gait | None = None, moved: Callable[[str], str] | None = None
-) -> Table:
-    """Returns a run's numbers as a table for the terminal, those to compare with beside them, perhaps with its gait.
+def summary_table(numbers: Summary, config: RunConfig, moved: Callable[[str], str] | None = None) -> Table:
+    """Returns a run's numbers as a table for the terminal, those to compare with beside them.
 
-    Rows without a number are left out, unless there is one to compare with. A column says how far each moves in finer
-    runs where a function of its field says that.
+    Args:
+        numbers: The numbers.
+        config: Configuration of the run.
+        moved: Says how far a number, named as in `NUMBERS`, moves in finer runs; it adds a column.
     """
     compared = COMPARED if references(config) else ()
     duration = "" if numbers.duration_s is None else f", {numbers.duration_s:g} s"
@@ -131,50 +99,78 @@ def summary_table(
     table = framed_table("quantity", "this run", *checked, *compared, title=title, caption=caption)
     for column, narrowest in zip(table.columns, (12, 16), strict=False):
         column.min_width = narrowest
-
-    def said(field: str) -> tuple[str, ...]:
-        return () if moved is None else (moved(field),)
-
-    for field, (label, ours, *beside) in _rows_by_field(numbers, config).items():
-        table.add_row(label, ours, *said(field), *beside[: len(compared)])
-    if locomotion is not None:
-        table.add_section()
-        for field, row in _gait_rows_by_field(locomotion).items():
-            table.add_row(*row, *said(field))
+    for name, (label, ours, *beside) in _rows(numbers, config).items():
+        table.add_row(label, ours, *(() if moved is None else (moved(name),)), *beside[: len(compared)])
     return table
 
 
-def gait_rows(numbers: Gait) -> list[tuple[str, str]]:
-    """Returns label and value of every number that a gait has."""
-    return list(_gait_rows_by_field(numbers).values())
+def summary_rows(numbers: Summary, config: RunConfig, only: Collection[str] | None = None) -> list[Row]:
+    """Returns the rows of a run's table in which there is a number, ours or one to compare with.
+
+    Args:
+        numbers: The numbers.
+        config: Configuration of the run.
+        only: Names of the numbers wanted, as in `NUMBERS`; all for None.
+    """
+    return [row for name, row in _rows(numbers, config).items() if only is None or name in only]
 
 
-def _gait_rows_by_field(numbers: Gait) -> dict[str, tuple[str, str]]:
-    rows: dict[str, tuple[str, str]] = {}
-    if numbers.speed_m_per_s is not None and numbers.stride_m is not None:
-        lengths = numbers.speed_body_lengths_per_s, numbers.stride_body_lengths
-        speed, stride = (f" ({x:.3f} body lengths)" if x is not None else "" for x in lengths)
-        of_cycles = f"speed, {numbers.cycles} cycle{'' if numbers.cycles == 1 else 's'}"
-        rows["speed_m_per_s"] = (of_cycles, f"{100 * numbers.speed_m_per_s:.2f} cm/s{speed.replace(')', '/s)')}")
-        rows["stride_m"] = ("stride", f"{100 * numbers.stride_m:.1f} cm{stride}")
-    values: dict[str, Row] = {"contact_duty": ("on the ground", 100.0, 0, "%"), **GAIT_ROWS}
-    rows |= {field: (row[0], quantity(getattr(numbers, field), *row[1:])) for field, row in values.items()}
-    if numbers.turning_radius_m is not None:
-        side = "left" if numbers.turning_radius_m > 0 else "right"
-        rows["turning_radius_m"] = ("turning radius", f"{abs(numbers.turning_radius_m):.2f} m to the {side}")
-    if (energy := numbers.energy) is not None:
-        rows["energy_muscle_work_J"] = ("muscles' net work, whole run", f"{energy.muscle_work_J:.2f} J")
-        parts = {
-            "stored": energy.kinetic_J + energy.elastic_J + (energy.potential_J or 0.0),
-            "slip": energy.slip_J,
-            "other constraints": energy.constraints_J,
-            "damping": energy.damping_J,
-            "integrator": energy.numerical_J,
-        }
-        if energy.muscle_work_J > 0:
-            shares = (f"{n} {100 * part / energy.muscle_work_J:.0f} %" for n, part in parts.items() if part is not None)
-            rows["energy"] = ("of which", ", ".join(shares))
-    return {field: row for field, row in rows.items() if row[1] != UNKNOWN}
+def _rows(numbers: Summary, config: RunConfig) -> dict[str, Row]:
+    """Rows by the name of their number; those without any number are left out."""
+    beside = references(config)
+    # A planar worm has one sensor per segment, and no name for it.
+    sensor = config.body.springs.first_sensor if isinstance(config.body, WormBody) else None
+    cells = {"order": ("segment at onset (s)", _onsets(numbers)), "wave": ("wave 1-2-..-N", _wave(numbers))}
+    # What is no section's own, such as the speed of computing, comes last.
+    for name, number in sorted(NUMBERS.items(), key=lambda one: one[1].section is Summary):
+        if number.label and name not in _NO_ROW and (sensor is not None or ", mean" not in number.label):
+            label = number.label.replace("first helix", sensor) if sensor else number.label.replace(", first helix", "")
+            cells[name] = (label, _ours(name, numbers))
+        if name == "energy_muscle_work_J":
+            cells["energy"] = ("of which", _shares_of_the_work(numbers))
+    rows = {
+        name: Row(*cell, _theirs(name, beside.get(name)), _deviation(name, numbers, beside.get(name)))
+        for name, cell in cells.items()
+    }
+    return {name: row for name, row in rows.items() if row.ours != UNKNOWN or row.reference}
+
+
+def _ours(name: str, numbers: Summary) -> str:
+    text = NUMBERS[name].text(getattr(numbers, name))
+    further, form = _IN_BRACKETS.get(name, ("", ""))
+    if further and (value := getattr(numbers, further)) is not None:
+        text += f" ({form.format(NUMBERS[further].text(value))})"
+    return text
+
+
+def _onsets(numbers: Summary) -> str:
+    pairs = list(zip(numbers.order, numbers.onsets_s, strict=True))
+    onsets = ", ".join(f"{segment} at {time:.2f}" for segment, time in pairs[:_ONSETS_SHOWN])
+    return onsets + _and_more(pairs) or "none"
+
+
+def _and_more(items: Sequence[Any]) -> str:
+    return f", and {len(items) - _ONSETS_SHOWN} more" if len(items) > _ONSETS_SHOWN else ""
+
+
+def _wave(numbers: Summary) -> str:
+    cycles = f"{numbers.full_cycles} full cycle{'' if numbers.full_cycles == 1 else 's'}"
+    return f"yes, {cycles}" if numbers.wave else "too short to judge" if numbers.wave is None else f"no ({cycles})"
+
+
+def _shares_of_the_work(numbers: Summary) -> str:
+    """Says where the muscles' work went, in percent."""
+    work, kinetic, elastic = numbers.energy_muscle_work_J, numbers.energy_kinetic_J, numbers.energy_elastic_J
+    if work is None or kinetic is None or elastic is None or work <= 0:
+        return UNKNOWN
+    parts = {
+        "stored": kinetic + elastic + (numbers.energy_potential_J or 0.0),
+        "slip": numbers.energy_slip_J,
+        "other constraints": numbers.energy_constraints_J,
+        "damping": numbers.energy_damping_J,
+        "integrator": numbers.energy_numerical_J,
+    }
+    return ", ".join(f"{name} {100 * part / work:.0f} %" for name, part in parts.items() if part is not None)
 
 
 def comparison_table(comparison: Comparison) -> Table:
@@ -183,12 +179,12 @@ def comparison_table(comparison: Comparison) -> Table:
     table = _side_by_side("quantity", comparison.labels, caption)
     table.add_row("status", *(status.replace("_", " ") for status in comparison.statuses))
     table.add_row("order of contractions", *map(_first_of_order, comparison.orders))
-    for field, row in COMPARISON_ROWS.items():
-        values = comparison.numbers.get(field, ())
-        if any(value is not None for value in values):
-            shares = (_percents(share, lambda percent: f"{percent:+.1f}") for share in comparison.differences(field))
+    for name, values in comparison.numbers.items():
+        if NUMBERS[name].label and any(value is not None for value in values):
+            shares = (_percents(share, lambda percent: f"{percent:+.1f}") for share in comparison.differences(name))
             below = (f"\n({share})" if share else "" for share in shares)
-            table.add_row(row[0], *(quantity(v, *row[1:]) + more for v, more in zip(values, below, strict=True)))
+            texts = map(NUMBERS[name].text, values)
+            table.add_row(NUMBERS[name].label, *(text + more for text, more in zip(texts, below, strict=True)))
     return table
 
 
@@ -203,44 +199,14 @@ def fields_table(comparison: Comparison) -> Table:
     return table
 
 
-def summary_rows(
-    numbers: Summary, config: RunConfig, only: Collection[str] = ("order", "wave", *SUMMARY_ROWS)
-) -> list[tuple[str, str, str, str]]:
-    """Returns label, our number, the one to compare with and the deviation of every row in which there is a number."""
-    return [row for field, row in _rows_by_field(numbers, config).items() if field in only]
-
-
-def _rows_by_field(numbers: Summary, config: RunConfig) -> dict[str, tuple[str, str, str, str]]:
-    beside = references(config)
-    pairs = list(zip(numbers.order, numbers.onsets_s, strict=True))
-    onsets = ", ".join(f"{segment} at {time:.2f}" for segment, time in pairs[:_ONSETS_SHOWN])
-    more = f", and {len(pairs) - _ONSETS_SHOWN} more" if len(pairs) > _ONSETS_SHOWN else ""
-    cycles = f"{numbers.full_cycles} full cycle{'' if numbers.full_cycles == 1 else 's'}"
-    wave = f"yes, {cycles}" if numbers.wave else "too short to judge" if numbers.wave is None else f"no ({cycles})"
-    cells = [("segment at onset (s)", onsets + more or "none", "order"), ("wave 1-2-..-N", wave, "wave")]
-    # A planar worm has one sensor per segment, and no name for it.
-    sensor = f", {config.body.springs.first_sensor}" if isinstance(config.body, WormBody) else ""
-    for field, row in SUMMARY_ROWS.items():
-        if sensor or ", mean" not in row[0]:
-            text = quantity(getattr(numbers, field), *row[1:])
-            if field == "period_s" and numbers.period_std_s is not None:
-                text += f" (std {numbers.period_std_s:.3f} s)"
-            cells.append((row[0].replace(", first helix", sensor), text, field))
-    rows = {
-        field: (label, ours, _theirs(field, beside.get(field)), _deviation(field, numbers, beside.get(field)))
-        for label, ours, field in cells
-    }
-    return {field: row for field, row in rows.items() if row[1] != UNKNOWN or row[2]}
-
-
-def _deviation(field: str, numbers: Summary, entry: Published | None) -> str:
+def _deviation(name: str, numbers: Summary, entry: Published | None) -> str:
     """By how many percent our number, or that of each segment, is above the one to compare with.
 
     Empty for shares, speeds of computing and words, for the range over sensors, and where either number is lacking.
     """
-    if entry is None or field in SPREAD or isinstance(entry.value, str) or SUMMARY_ROWS[field][-1] in ("%", ""):
+    if entry is None or name in SPREAD or isinstance(entry.value, str) or NUMBERS[name].shown_unit in ("%", ""):
         return ""
-    return _percents(relative_difference(entry.value, getattr(numbers, field)), _signed)
+    return _percents(relative_difference(entry.value, getattr(numbers, name)), _signed)
 
 
 def legend(numbers: Summary, config: RunConfig) -> str:
@@ -284,34 +250,6 @@ def closing_sentence(numbers: Summary, config: RunConfig) -> str:
     return f"{config.name} does not reproduce the paper's formulation within {within}: {', '.join(apart)}; next: {NEXT}"
 
 
-def presets_table(presets: Sequence[RunConfig]) -> Table:
-    """Lists configurations: name, summary, segments and simulated time."""
-    rows = ((c.name, c.summary, str(c.body.n_segments), f"{c.duration_s:g} s") for c in presets)
-    return _list(("preset", "what it is", "segments", "simulated"), rows)
-
-
-def arenas_table(summaries: Mapping[str, str]) -> Table:
-    """Lists arenas, their names and summaries."""
-    return _list(("arena", "what it is"), summaries.items())
-
-
-def field_lines(config: RunConfig) -> list[str]:
-    """Returns one line for every field of a configuration: path, value as TOML writes it, and what it means."""
-    lines = []
-    for path, meaning in fields_of(config).items():
-        value = field_value(config, path)
-        setting = f"{path} (not set)" if value is None else f"{path} = {toml_value(value)}"
-        lines.append(f"{setting:<60}{'  # ' if meaning else ''}{meaning}".rstrip())
-    return lines
-
-
-def _list(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> Table:
-    table = Table(*headings, box=None, pad_edge=False)
-    for row in rows:
-        table.add_row(*row)
-    return table
-
-
 def _side_by_side(first: str, labels: Sequence[str], caption: str | None) -> Table:
     table = framed_table(first, *labels, caption=caption)
     for column in table.columns[1:]:
@@ -319,13 +257,13 @@ def _side_by_side(first: str, labels: Sequence[str], caption: str | None) -> Tab
     return table
 
 
-def _theirs(field: str, entry: Published | None) -> str:
+def _theirs(name: str, entry: Published | None) -> str:
     if entry is None:
         return ""
     source = "" if entry.paper == FORMULATION else " [P]"
     if isinstance(entry.value, str):
         return f"{entry.value}{source}"
-    return f"{quantity(entry.value, *SUMMARY_ROWS[field][1:])}{source}"
+    return f"{NUMBERS[name].text(entry.value)}{source}"
 
 
 def _about_rigid_crossings(numbers: Summary) -> str:
@@ -345,15 +283,14 @@ def _about_rigid_crossings(numbers: Summary) -> str:
 def _first_of_order(order: Sequence[int]) -> str:
     if not order:
         return UNKNOWN
-    more = f" and {len(order) - _ONSETS_SHOWN} more" if len(order) > _ONSETS_SHOWN else ""
-    return "-".join(map(str, order[:_ONSETS_SHOWN])) + more
+    return "-".join(map(str, order[:_ONSETS_SHOWN])) + _and_more(order)
 
 
 def _setting(value: Any) -> str:
     return "not set" if value is None else shortened(toml_value(value), MOST_CHARACTERS)
 
 
-def _percents(shares: Number, form: Callable[[float], str]) -> str:
+def _percents(shares: Value, form: Callable[[float], str]) -> str:
     """Writes a share, or one per segment, in percent; nothing where none is known."""
     each = shares if isinstance(shares, Sequence) else [shares]
     if all(share is None for share in each):
@@ -363,13 +300,3 @@ def _percents(shares: Number, form: Callable[[float], str]) -> str:
 
 def _signed(percent: float) -> str:
     return f"{percent:+z.1f}" if abs(percent) < 9.95 else f"{percent:+.0f}"
-
-
-def quantity(value: float | Sequence[float | None] | None, factor: float, digits: int, unit: str) -> str:
-    """Writes a number, or one per segment: multiplied, rounded, with its unit; a dash for None."""
-    if value is None:
-        return UNKNOWN
-    if isinstance(value, list | tuple):
-        return f"{' / '.join(quantity(v, factor, digits, '') for v in value)} {unit}"
-    assert isinstance(value, int | float)
-    return f"{factor * value:z.{digits}f} {unit}".rstrip()

@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
+from annelid.analysis import NUMBERS
 from annelid.body.worm import WormBody
 from annelid.config import RunConfig
 from annelid.errors import ConfigError, listed
 from annelid.experiment.case import Case
 from annelid.experiment.executors import workers
-from annelid.experiment.numbers import NUMBERS
 from annelid.experiment.outcome import Outcome, outcome
 from annelid.experiment.progress import StudyProgress
 from annelid.experiment.store import Store, case_key
@@ -122,11 +122,13 @@ class Check:
         further = "".join(f" {one}" for one in self.left_out)
         if self.resolved:
             worst = max(self.moved, key=lambda name: self.largest(name) or 0.0, default=None)
-            most = f"; {NUMBERS[worst].text} moves most, by {percent(self.largest(worst) or 0.0)}" if worst else ""
+            most = f"; {NUMBERS[worst].label} moves most, by {percent(self.largest(worst) or 0.0)}" if worst else ""
             return f"Resolved: with {tried} no number moves by more than {percent(RESOLVED)}{most}.{further}"
         faults = [*self.differences]
         if self.unresolved:
-            named = listed([f"{NUMBERS[name].text} ({percent(self.largest(name) or 0.0)})" for name in self.unresolved])
+            named = listed(
+                [f"{NUMBERS[name].label} ({percent(self.largest(name) or 0.0)})" for name in self.unresolved]
+            )
             faults.append(f"these numbers move by more than {percent(RESOLVED)}: {named}")
         return f"Not resolved: with {tried} {'; '.join(faults)}. {self._advice}{further}"
 
@@ -210,8 +212,8 @@ def compare(run: Outcome, finer: Mapping[Refinement, Outcome | str], left_out: S
         if (found.rhythm.verdict, found.summary.wave) != (run.rhythm.verdict, run.summary.wave):
             differences.append(f"the order of contractions is another one with {one.words}")
         for name in CHECKED:
-            number = NUMBERS[name]
-            change = _change(number.read(run), number.read(found), of_share=number.unit == "1")
+            values = getattr(run.summary, name), getattr(found.summary, name)
+            change = _change(*values, of_share=NUMBERS[name].unit == "1")
             if change is not None:
                 moved.setdefault(name, {})[one.name] = change
     return Check(moved, tuple(finer), tuple(left_out), tuple(differences))

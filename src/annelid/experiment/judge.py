@@ -38,7 +38,7 @@ def judge(outcome: Outcome, numerics: float | None = None) -> Judged:
     problem = _problem(outcome)
     if not problem and numerics is not None:
         problem = numerical_problem(outcome, numerics)
-    return Judged(None if outcome.message else outcome.gait, problem)
+    return Judged(None if outcome.message else outcome.summary, problem)
 
 
 def numerical_problem(outcome: Outcome, largest_share: float) -> str:
@@ -48,15 +48,14 @@ def numerical_problem(outcome: Outcome, largest_share: float) -> str:
         outcome: Of the run.
         largest_share: How much of that work it may take or add; below 1.
     """
-    energy = outcome.gait.energy
-    share = None if energy is None or energy.muscle_work_J < LEAST_WORK_J else energy.numerical_share
-    if share is None or abs(share) <= largest_share:
+    work_J, share = outcome.summary.energy_muscle_work_J, outcome.summary.energy_numerical_share
+    if work_J is None or share is None or work_J < LEAST_WORK_J or abs(share) <= largest_share:
         return ""
     return f"the integrator {'took' if share > 0 else 'added'} {abs(share):.0%} of the muscles' work"
 
 
 def _problem(outcome: Outcome) -> str:
-    rhythm, gait = outcome.rhythm, outcome.gait
+    rhythm, gait = outcome.rhythm, outcome.summary
     if outcome.message:
         return f"stopped: {outcome.message}"
     if rhythm.verdict == "silent":

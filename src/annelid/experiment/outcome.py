@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from annelid.analysis import Gait, RhythmScore, Summary, gait, rhythm_score, summary
+from annelid.analysis import RhythmScore, Summary, rhythm_score, summary
 from annelid.experiment.fingerprint import READERS, code_fingerprint
 from annelid.simulation.runfile import Run
 
@@ -45,7 +45,6 @@ class Outcome:
     """Of its open-loop contractions, in the order of the program; empty in closed loop."""
     message: str
     """Why it ended before its time; empty if it did not."""
-    gait: Gait = field(default_factory=Gait)
     cpu_time_s: float = 0.0
     """Processor time that the run took, whatever else the machine did; 0 where it is not known."""
 
@@ -60,15 +59,12 @@ class _Written(BaseModel):
     rhythm: RhythmScore
     holds: tuple[Hold, ...]
     message: str
-    gait: Gait
     cpu_time_s: float
 
 
 def outcome(run: Run) -> Outcome:
     """Reads a run's outcome."""
-    return Outcome(
-        run.path.parent, summary(run), rhythm_score(run), _holds(run), run.message, gait(run), run.cpu_time_s
-    )
+    return Outcome(run.path.parent, summary(run), rhythm_score(run), _holds(run), run.message, run.cpu_time_s)
 
 
 def write_outcome(read: Outcome, path: Path) -> None:

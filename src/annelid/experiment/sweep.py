@@ -21,6 +21,7 @@ import numpy as np
 import xarray as xr
 from rich.table import Table
 
+from annelid.analysis import NUMBERS, Number
 from annelid.config import (
     RunConfig,
     Study,
@@ -37,7 +38,7 @@ from annelid.errors import ConfigError, shown
 from annelid.experiment.case import Case
 from annelid.experiment.check import MORE, Check, check_runs, percent, refinements
 from annelid.experiment.executors import workers
-from annelid.experiment.numbers import NUMBERS, PREFERRED, Number, chosen_numbers
+from annelid.experiment.numbers import PREFERRED, chosen_numbers
 from annelid.experiment.progress import StudyProgress
 from annelid.experiment.space import Choice, Variable, from_unit, sampled, unit_samples, variables_of
 from annelid.experiment.store import Done, Store
@@ -123,7 +124,10 @@ class Sweep:
             table = np.array(of_runs, dtype=object).reshape(plan.shape)
             variables[name] = (dims, table, {"units": "1", "long_name": text})
         outcomes = [run.outcome for run in self.runs]
-        read = {number: [None if one is None else number.read(one) for one in outcomes] for number in self.numbers}
+        read = {
+            number: [None if one is None else getattr(one.summary, number.name) for one in outcomes]
+            for number in self.numbers
+        }
         lengths = [len(value or ()) for number, values in read.items() if number.per_segment for value in values]
         n_segments = max(lengths, default=0)
         for number, values in read.items():
@@ -132,7 +136,7 @@ class Sweep:
             for row, value in zip(table, values, strict=True):
                 if value is not None:
                     row[: np.size(value)] = np.array(value, dtype=float)
-            attrs = {"units": number.unit, "long_name": number.text}
+            attrs = {"units": number.unit, "long_name": number.meaning}
             variables[number.name] = ((*dims, *below), table.reshape(*plan.shape, *below.values()), attrs)
         counted = {SAMPLE: "number of the sample", REPEAT: "seed of the run", SEGMENT: "segment, from the front"}
         levels = dict(plan.levels) | ({SEGMENT: range(1, n_segments + 1)} if lengths else {})

@@ -39,7 +39,7 @@ _ROWS = {
     "the same, net work": "cost_of_transport_net",
     "the same, cables": "cost_of_transport_cables",
     "slip ratio": "slip_ratio",
-    "period (s)": "period_s",
+    "period (s)": "gait_period_s",
     "cycles": "cycles",
 }
 MOST_SHOWN = 8

@@ -6,13 +6,13 @@ from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from annelid.analysis import gait, summary
+from annelid.analysis import summary
 from annelid.config import RunConfig, field_value, fields_of, toml_value
 from annelid.draw.figures.track import track_figure
 from annelid.draw.page import html_page
 from annelid.draw.plots import figure7
 from annelid.draw.render import Progress, render_frame
-from annelid.draw.table import COMPARED, closing_sentence, gait_rows, legend, summary_rows
+from annelid.draw.table import COMPARED, closing_sentence, legend, summary_rows
 from annelid.errors import AnnelidError
 from annelid.markdown import anchors, code, emphasis, table, words
 from annelid.output import whole_file
@@ -62,7 +62,6 @@ def _numbers(run: Run) -> list[str]:
     numbers = summary(run)
     rows = summary_rows(numbers, run.config)
     beside = legend(numbers, run.config)
-    rows += [(label, value, "", "") for label, value in gait_rows(gait(run))]
     header = ["quantity", "this run", *(COMPARED if beside else ())]
     cells = [[words(word) for word in row[: len(header)]] for row in rows]
     below = [beside, closing_sentence(numbers, run.config)]

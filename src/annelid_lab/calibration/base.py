@@ -94,7 +94,7 @@ class Experiment(Kind):
         return {}
 
 
-def beside(folder: Path, given: str, what: str) -> Path:
+def file_beside(folder: Path, given: str, what: str) -> Path:
     """Returns the path of a file that a study names.
 
     Raises:

@@ -19,7 +19,7 @@ from annelid.config import RunConfig, check_section, load_config
 from annelid.errors import ConfigError, SimulationStopped
 from annelid.protocols import Array
 from annelid_lab.calibration.base import Data, Experiment, Found
-from annelid_lab.calibration.noise import Noise, estimated, solved, whitened
+from annelid_lab.calibration.noise import Noise, estimated, whitened
 from annelid_lab.calibration.simulations import Simulations
 from annelid_lab.calibration.study import IdentifyStudy
 
@@ -237,7 +237,7 @@ def held_out(experiment: Experiment, data: Data) -> np.ndarray:
     return held
 
 
-def some(data: Data, rows: np.ndarray) -> Data:
+def points_at(data: Data, rows: np.ndarray) -> Data:
     """Returns some points of an experiment."""
     return replace(data, at=data.at[rows], values=data.values[rows], series=data.series[rows])
 
@@ -272,7 +272,7 @@ def fitted(study: IdentifyStudy, folder: Path, simulations: Simulations) -> tupl
         for one, data in zip(study.experiments, model.data, strict=True)
     ]
     for left in reversed(range(ROUNDS + 1)):
-        kept = [some(data, ~held) for data, held in zip(model.data, model.rows, strict=True)]
+        kept = [points_at(data, ~held) for data, held in zip(model.data, model.rows, strict=True)]
         roots = [noise.root(data) for noise, data in zip(noises, kept, strict=True)]
 
         def residual(at: Array, roots: list[Array] = roots, kept: list[Data] = kept) -> Array:
@@ -316,7 +316,17 @@ def _fit_of(model: Model, logs: Array, noises: Sequence[Noise]) -> Fit:
     ):
         numbers = one.numbers(data, what)
         parts.append(
-            Part(one, some(data, ~held), some(data, held), there[~held], there[held], j[~held], j[held], noise, numbers)
+            Part(
+                one,
+                points_at(data, ~held),
+                points_at(data, held),
+                there[~held],
+                there[held],
+                j[~held],
+                j[held],
+                noise,
+                numbers,
+            )
         )
     return Fit(model.study, logs, tuple(parts), prior_rows(model.study, logs), model.simulations.computed)
 
@@ -340,8 +350,3 @@ def _refuse_unlike(study: IdentifyStudy, model: Model, predicted: Sequence[Array
                 f"the data of experiments.{one.name} reach {sizes[0]:.3g} {data.unit}, the worm that the fit starts "
                 f"from {sizes[1]:.3g} {data.unit}: is a unit wrong?"
             )
-
-
-def relative_gain(fit: Fit) -> list[Array]:
-    """How the parameters' logarithms follow from each experiment's residuals, ``(p, n)``, to first order."""
-    return [fit.covariance @ solved(part.root, part.jacobian).T for part in fit.parts]

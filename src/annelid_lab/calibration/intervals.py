@@ -1,4 +1,4 @@
-"""How well a fit determines its parameters: profile likelihood, block bootstrap, and what cannot be told apart."""
+"""How well a fit determines its parameters: profile likelihood, and what cannot be told apart."""
 
 from __future__ import annotations
 
@@ -11,13 +11,11 @@ import numpy as np
 from annelid.errors import SimulationStopped
 from annelid.protocols import Array
 from annelid_lab.calibration.base import Data
-from annelid_lab.calibration.fit import SINGULAR, Fit, Model, Part, bounds, prior_rows, relative_gain
+from annelid_lab.calibration.fit import SINGULAR, Fit, Model, Part, bounds, prior_rows
 from annelid_lab.calibration.noise import whitened
 
 LEVEL = 0.95
 """Of the intervals."""
-REPLICATES = 2000
-"""Of the bootstrap."""
 FEWEST_FREE = 2.0
 """Degrees of freedom at least, of the errors of an experiment."""
 WIDEST = 3.0
@@ -34,7 +32,6 @@ class Intervals:
 
     Attributes:
         profile: By profile likelihood, ``(p, 2)``.
-        bootstrap: By block bootstrap, ``(p, 2)``.
         relative_error: Standard error of the logarithm of each, ``(p,)``.
         correlation: Of these, ``(p, p)``.
         errors: Relative standard errors of independent combinations of the parameters, greatest first, ``(p,)``.
@@ -45,7 +42,6 @@ class Intervals:
     """
 
     profile: Array
-    bootstrap: Array
     relative_error: Array
     correlation: Array
     errors: Array
@@ -64,9 +60,6 @@ def intervals(fit: Fit, model: Model) -> Intervals:
     errors = 1.0 / np.sqrt(np.maximum(values, SINGULAR * values[-1]))
     return Intervals(
         profile=_profile(fit, model, error, quantile),
-        bootstrap=np.exp(
-            fit.logs[:, None] + np.quantile(replicates(fit), [0.5 - LEVEL / 2, 0.5 + LEVEL / 2], axis=0).T
-        ),
         relative_error=error,
         correlation=correlation,
         errors=errors,
@@ -90,7 +83,8 @@ def _quantiles(fit: Fit) -> Array:
     """
     from scipy.stats import t
 
-    shares = [np.einsum("pn,nm,pm->p", gain, part.root @ part.root.T, gain) for part, gain in _gains(fit)]
+    # The variance of a parameter is C, that of the part's points through the gains C J' R^-1: C (J' R^-1 J) C.
+    shares = [np.diag(fit.covariance @ part.information @ fit.covariance) for part in fit.parts]
     total = np.maximum(np.diag(fit.covariance), 1e-300)
     slack = sum((share / total) ** 2 / _freedom(fit, part) for share, part in zip(shares, fit.parts, strict=True))
     return t.ppf(0.5 + LEVEL / 2, 1.0 / np.maximum(slack, 1e-9))
@@ -103,10 +97,6 @@ def band(fit: Fit, part: Part, data: Data, jacobian: Array) -> Array:
     quantile = float(t.ppf(0.5 + LEVEL / 2, _freedom(fit, part)))
     variance = np.einsum("np,pq,nq->n", jacobian, fit.covariance, jacobian)
     return quantile * np.sqrt(variance + np.diag(part.noise.covariance(data)))
-
-
-def _gains(fit: Fit) -> list[tuple[Part, Array]]:
-    return list(zip(fit.parts, relative_gain(fit), strict=True))
 
 
 def _profile(fit: Fit, model: Model, error: Array, quantile: Array) -> Array:
@@ -152,35 +142,6 @@ def _misfit(fit: Fit, fitted: Sequence[Array], logs: Array, fixed: int | None) -
     if j.shape[1]:
         r = r - j @ np.linalg.lstsq(j, r, rcond=None)[0]
     return float(r @ r)
-
-
-def replicates(fit: Fit, n: int = REPLICATES, seed: int = 0) -> Array:
-    """Changes of the parameters' logarithms in a bootstrap, ``(n, p)``.
-
-    Blocks of neighbouring residuals of each series are drawn and laid one after another, each long enough to hold their
-    correlation; how the parameters answer is linear, so nothing is simulated. Priors are drawn too.
-    """
-    rng = np.random.default_rng(seed)
-    total = np.zeros((n, len(fit.logs)))
-    for part, gain in _gains(fit):
-        # What the parameters have fitted away makes residuals smaller than errors.
-        size = sqrt(part.noise.noise**2 + part.noise.discrepancy**2) / max(part.rms, 1e-300)
-        for one in np.unique(part.data.series):
-            mine = np.flatnonzero(part.data.series == one)
-            residual = part.residual[mine] - part.residual[mine].mean() * (part.noise.discrepancy == 0.0)
-            m = len(mine)
-            spacing = float(np.ptp(part.data.at[mine])) / max(m - 1, 1)
-            length = int(np.clip(round(2.0 * part.noise.length / max(spacing, 1e-300)), 1, max(m // 4, 1)))
-            if part.noise.discrepancy < 0.1 * part.noise.noise:
-                length = 1
-            blocks = -(-m // length)
-            starts = rng.integers(0, m - length + 1, (n, blocks))
-            order = (starts[..., None] + np.arange(length)).reshape(n, -1)[:, :m]
-            # Blocks change their signs: a series with a mean of its own would else shift every replicate alike.
-            signs = np.repeat(rng.choice([-1.0, 1.0], (n, blocks)), length, axis=1)[:, :m]
-            total += size * (residual[order] * signs) @ gain[:, mine].T
-    priors = fit.covariance @ fit.prior[1].T
-    return total + rng.normal(size=(n, priors.shape[1])) @ priors.T
 
 
 def _inside(fit: Fit, part: Part) -> tuple[int, int]:

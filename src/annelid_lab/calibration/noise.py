@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from math import exp, log, sqrt
 
 import numpy as np
-from scipy.linalg import cho_solve, cholesky, solve_triangular
+from scipy.linalg import cholesky, solve_triangular
 
 from annelid.protocols import Array
 from annelid_lab.calibration.base import Data
@@ -107,8 +107,3 @@ def estimated(data: Data, residual: Array, jacobian: Array, elsewhere: Array, st
 def whitened(root: Array, values: Array) -> Array:
     """Divides values or columns by the lower root of their covariance."""
     return solve_triangular(root, values, lower=True)
-
-
-def solved(root: Array, values: Array) -> Array:
-    """Divides values or columns by a covariance of which this is the lower root."""
-    return cho_solve((root, True), values)

@@ -60,8 +60,6 @@ class Identified:
                     "relative_error": float(known.relative_error[i]),
                     "low": float(known.profile[i, 0]),
                     "high": float(known.profile[i, 1]),
-                    "bootstrap_low": float(known.bootstrap[i, 0]),
-                    "bootstrap_high": float(known.bootstrap[i, 1]),
                     "at_bound": name in fit.at_bound,
                 }
                 for i, (name, value) in enumerate(fit.values.items())
@@ -125,7 +123,7 @@ def tables(found: Identified) -> list[Table]:
     fit, known = found.fit, found.intervals
     caption = "; ".join(known.confused) or "the data tell all parameters apart"
     first = Table("parameter", "unit", title=f"{found.study.name}: {fit.n_tests} tests of worms", caption=caption)
-    for heading in ("value", "95 % profile likelihood", "95 % block bootstrap", "largest correlation"):
+    for heading in ("value", "95 % profile likelihood", "largest correlation"):
         first.add_column(heading, justify="right")
     for i, (name, value) in enumerate(fit.values.items()):
         others = np.delete(np.arange(len(fit.names)), i)
@@ -134,7 +132,7 @@ def tables(found: Identified) -> list[Table]:
             name,
             found.study.parameters[name].unit,
             f"{value:.4g}" + (" (bound)" if name in fit.at_bound else ""),
-            *(f"{one[i, 0]:.4g} to {one[i, 1]:.4g}" for one in (known.profile, known.bootstrap)),
+            f"{known.profile[i, 0]:.4g} to {known.profile[i, 1]:.4g}",
             f"{known.correlation[i, worst]:+.2f} {fit.names[worst]}" if len(others) else "",
         )
     second = Table("experiment", "unit", title="errors of the experiments, standard deviations of a point")

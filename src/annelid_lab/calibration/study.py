@@ -24,7 +24,7 @@ from annelid.config import (
 from annelid.errors import ConfigError, shown, suggest
 from annelid.experiment import SHEAR_OVER_YOUNG
 from annelid.textfiles import check_depth, read_toml
-from annelid_lab.calibration.base import Experiment, beside
+from annelid_lab.calibration.base import Experiment, file_beside
 
 MOST = 20
 """Parameters, and experiments, that a study may have."""
@@ -151,7 +151,7 @@ class IdentifyStudy(Section):
         chosen = {name: known[name].model_dump(exclude_none=True) for name in names}
         return check_section(IdentifyStudy, {**self.model_dump(exclude_none=True), "parameters": chosen})
 
-    def but(self, changes: Mapping[str, Any]) -> IdentifyStudy:
+    def with_changes(self, changes: Mapping[str, Any]) -> IdentifyStudy:
         """Returns the study with further changes of its worm, by dotted path."""
         return self.model_copy(update={"set": {**self.set, **changes}})
 
@@ -161,7 +161,7 @@ class IdentifyStudy(Section):
             return self.preset
         if not self.preset.endswith(".toml"):
             raise ConfigError(f"preset = {shown(self.preset)}: {suggest(self.preset, preset_names())}")
-        return str(beside(folder, self.preset, "preset"))
+        return str(file_beside(folder, self.preset, "preset"))
 
     def worm(self, folder: Path) -> RunConfig:
         """Returns the worm that the study starts from, whose file may lie in the study's folder."""

@@ -1,10 +1,8 @@
-"""The commands `loop` and `pseudo-robot`."""
+"""The command `loop`: robots and firmware in the loop."""
 
 from __future__ import annotations
 
 import math
-import time
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -57,6 +55,9 @@ def loop_command(
     firmware: Annotated[
         str | None, typer.Option(metavar="LINE", help=f"A controller that speaks annelid's protocol: {_LINE}.")
     ] = None,
+    pseudo: Annotated[
+        bool, typer.Option("--pseudo", help="A simulated robot of servos, to try it without one.")
+    ] = False,
     rate: Annotated[float, typer.Option(help="Exchanges in a second.", min=1.0, max=10_000.0)] = 100.0,
     watchdog: Annotated[
         int, typer.Option(min=1, max=10_000, help="Stop after so many periods without a valid answer.")
@@ -100,23 +101,30 @@ def loop_command(
     annelid loop riddle2023-rods --robot udp:192.168.1.7:4242 --rate 50  a robot with a protocol of annelid's
     annelid loop riddle2023-rods --firmware /dev/ttyACM0                 a microcontroller and the simulated worm
     annelid loop riddle2023-rods --servos /dev/ttyUSB0 --most 0.6 --most-rate 2   gently
-    annelid pseudo-robot riddle2023-rods                 without hardware: a robot of servos to try it with
+    annelid loop riddle2023-rods --pseudo                                without hardware: a robot of servos, simulated
     """
     from annelid.output import write_csv
-    from annelid_lab.loop import Limits, Wiring, drive, open_link
+    from annelid.simulation import build_plant
+    from annelid_lab.loop import Limits, PseudoRobot, Wiring, drive, open_link
 
     config = config_of(preset, overrides_of(assignments, duration_s=duration), segments)
     limits = Limits(least, most, math.inf if most_rate is None else most_rate)
     wiring = Wiring(*ticks, *potentiometer)
-    if (robot, servos, firmware) == (None, None, None):
-        raise typer.BadParameter("name what is real: --robot, --servos or --firmware; else use annelid run")
-    if servos is None and (ticks, potentiometer) != (_TICKS, _POTENTIOMETER):
+    has_servos = servos is not None or pseudo
+    if robot is None and firmware is None and not has_servos:
+        raise typer.BadParameter("name what is real: --robot, --servos or --firmware; else --pseudo, or annelid run")
+    if servos is not None and pseudo:
+        raise typer.BadParameter("--pseudo stands for a robot of servos: leave out --servos")
+    if not has_servos and (ticks, potentiometer) != (_TICKS, _POTENTIOMETER):
         raise typer.BadParameter("--ticks and --potentiometer are of a robot of servos: they need --servos")
-    if robot is None and servos is None and (least, most, most_rate) != (0.0, 1.0, None):
+    if robot is None and not has_servos and (least, most, most_rate) != (0.0, 1.0, None):
         raise typer.BadParameter("--least, --most and --most-rate are limits of a robot: they need --robot or --servos")
     lines = {name: text for name, text in (("robot", robot), ("servos", servos), ("firmware", firmware)) if text}
     folder = locked_folder(out, config.name)
     links: dict[str, Any] = {}
+    if pseudo:
+        body = build_plant(config)
+        links["servos"] = PseudoRobot(body.n_segments, body.n_muscles, wiring=wiring)
     try:
         for name, text in lines.items():
             links[name] = open_link(text)
@@ -171,49 +179,3 @@ def _table(report: dict[str, Any], rows: list[dict[str, Any]]) -> Table:
             row["what"], str(row["missed"]), *("-" if each is None else f"{1e3 * each:.3f}" for each in times)
         )
     return table
-
-
-@command("pseudo-robot", "", as_json=False)
-def pseudo_robot_command(
-    preset: NamedPreset,
-    reach: Annotated[float, typer.Option(help="Lengthening of a segment that is contracted fully, m.")] = 0.06,
-    lag: Annotated[float, typer.Option(help="Time constant of a servo with its segment, s.", min=1e-3)] = 0.15,
-    noise: Annotated[float, typer.Option(help="Standard deviation of a potentiometer's noise, m.", min=0.0)] = 0.0005,
-    latency: Annotated[float, typer.Option(help="Time from a packet to its answer, s.", min=0.0, max=10.0)] = 0.001,
-    seed: Annotated[int, typer.Option(help="Seed of the noise.", min=0)] = 0,
-    ticks: Ticks = _TICKS,
-    potentiometer: Potentiometer = _POTENTIOMETER,
-    segments: Segments = None,
-    duration: Annotated[float | None, typer.Option(help="End after so long, s  [default: go on until Ctrl-C]")] = None,
-) -> None:
-    """Simulate a robot of servos behind a pseudo-terminal, to try `annelid loop` without hardware.
-
-    It has the segments and muscles of the preset. Servos answer in the manner of Dynamixel's protocol 2.0 and follow
-    their goals with a lag; potentiometers have noise and steps. Prints the path of the terminal and serves it.
-
-    \b
-    annelid pseudo-robot riddle2023-rods                     prints, for example, /dev/pts/5
-    annelid loop riddle2023-rods --servos /dev/pts/5         in another terminal
-    """
-    from annelid.errors import require_finite, require_positive
-    from annelid.simulation import build_plant
-    from annelid_lab.loop import PseudoRobot, Wiring, serve_terminal
-
-    if duration is not None:
-        require_finite(duration=duration)
-        require_positive(duration=duration)
-    body = build_plant(config_of(preset, {}, segments))
-    wiring = Wiring(*ticks, *potentiometer)
-    robot = PseudoRobot(
-        body.n_segments,
-        body.n_muscles,
-        reach_m=reach,
-        lag_s=lag,
-        noise_m=noise,
-        latency_s=latency,
-        seed=seed,
-        wiring=wiring,
-    )
-    end = math.inf if duration is None else time.monotonic() + duration
-    # At once, also into a pipe, since the command goes on.
-    serve_terminal(robot, lambda: time.monotonic() >= end, partial(print, flush=True))

@@ -4,7 +4,7 @@ from annelid_lab.loop.frames import Interface, Role
 from annelid_lab.loop.links import Link, SerialLink, UdpLink, open_link
 from annelid_lab.loop.loop import Driven, drive
 from annelid_lab.loop.peer import Fault, Peer, serve
-from annelid_lab.loop.pseudo_robot import PseudoRobot, pseudo_robot, serve_terminal
+from annelid_lab.loop.pseudo_robot import PseudoRobot
 from annelid_lab.loop.servos import Wiring
 from annelid_lab.loop.session import Limits
 
@@ -22,7 +22,5 @@ __all__ = [
     "Wiring",
     "drive",
     "open_link",
-    "pseudo_robot",
     "serve",
-    "serve_terminal",
 ]

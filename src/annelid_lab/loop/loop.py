@@ -20,7 +20,7 @@ from annelid_lab.loop.frames import MOST_STEPS, Interface, Role
 from annelid_lab.loop.links import Link
 from annelid_lab.loop.remote import PacedPlant, RemoteController, RemotePlant
 from annelid_lab.loop.servos import ServoPlant, Wiring
-from annelid_lab.loop.session import Limits, Pace, WirePartner
+from annelid_lab.loop.session import Limits, Pace, WirePartner, percentiles
 
 
 @dataclass(frozen=True)
@@ -122,8 +122,8 @@ def drive(
     finally:
         for part in parts:
             part.stop()
-    report: dict[str, Any] = {"rate_hz": rate_hz, "periods": pace.late.n, "missed_deadlines": pace.missed}
-    report |= {"slipped_s": pace.slipped_s, "lateness_s": pace.late.to_dict()}
+    report: dict[str, Any] = {"rate_hz": rate_hz, "periods": len(pace.late_s), "missed_deadlines": pace.missed}
+    report |= {"slipped_s": pace.slipped_s, "lateness_s": percentiles(pace.late_s)}
     return Driven(run, report | {part.partner.who: part.partner.to_dict() for part in parts})
 
 

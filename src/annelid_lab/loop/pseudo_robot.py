@@ -1,19 +1,16 @@
-"""A robot that is not there: servos and potentiometers behind a pseudo-terminal, each segment a model with a lag."""
+"""A simulated robot of servos: a line that answers as their bus would, each segment a model with a lag."""
 
 from __future__ import annotations
 
-import os
-import select
-import threading
+import time
 from collections import deque
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from time import monotonic
+from collections.abc import Callable
 
 import numpy as np
 
-from annelid.errors import ConfigError, require_at_least, require_finite, require_positive
-from annelid_lab.loop.servos import EVERYONE, WATCHDOG_UNIT_S, Instruction, PacketDecoder, Register, Wiring, packet
+from annelid.errors import require_at_least, require_finite, require_positive
+from annelid_lab.loop.links import MOST_READ
+from annelid_lab.loop.servos import BROADCAST, WATCHDOG_UNIT_S, Instruction, PacketDecoder, Register, Wiring, packet
 
 _SIZES = {
     Register.TORQUE: 1,
@@ -28,8 +25,15 @@ _DATA_RANGE_ERROR, _ACCESS_ERROR = 0x04, 0x07
 class PseudoRobot:
     """Servos 1 .. n, which follow their goals with a lag, and the potentiometers of the segments that they contract.
 
-    A contracted segment is longer by ``reach_m``. A potentiometer reads whole counts of 12 bits with normal noise.
+    A contracted segment is longer by ``reach_m``. A potentiometer reads whole counts of 12 bits with normal noise. It
+    is a `Link`: what the loop sends reaches the servos at once, and what they answer comes after a latency.
+
+    Attributes:
+        name: For sentences.
+        position: Of every servo, in its steps, ``(n_muscles,)``.
     """
+
+    name = "the pseudo-robot"
 
     def __init__(
         self,
@@ -42,6 +46,8 @@ class PseudoRobot:
         latency_s: float = 0.001,
         seed: int = 0,
         wiring: Wiring | None = None,
+        clock: Callable[[], float] = time.perf_counter,
+        sleep: Callable[[float], None] = time.sleep,
     ) -> None:
         """Makes a relaxed robot.
 
@@ -54,6 +60,8 @@ class PseudoRobot:
             latency_s: Time from a packet to its answer, s.
             seed: Of the noise.
             wiring: Positions and counts.
+            clock: Time that never goes back, s.
+            sleep: Waits so many seconds.
 
         Raises:
             ConfigError: A number is negative, not finite, or a lag is 0.
@@ -66,56 +74,73 @@ class PseudoRobot:
         self._reach_m, self._lag_s, self._noise_m, self._latency_s = reach_m, lag_s, noise_m, latency_s
         self._rng = np.random.default_rng(seed)
         self._decoder = PacketDecoder()
-        self._now_s = self._heard_s = 0.0
+        self._clock, self._sleep = clock, sleep
+        self._now_s = self._last_packet_s = clock()
         self._answers: deque[tuple[float, bytes]] = deque(maxlen=1024)
         self.position = np.full(n_muscles, float(self.wiring.relaxed))
         self._table = {register: np.zeros(n_muscles, dtype=np.int64) for register in _SIZES}
         self._table[Register.GOAL][:] = self.wiring.relaxed
-        self._given_up = np.zeros(n_muscles, dtype=bool)
+        self._watchdog_ended = np.zeros(n_muscles, dtype=bool)
 
     @property
     def contraction(self) -> np.ndarray:
         """How far each servo is from relaxed, 0, to contracted, 1."""
         return (self.position - self.wiring.relaxed) / (self.wiring.contracted - self.wiring.relaxed)
 
-    def receive(self, data: bytes) -> None:
-        """Takes bytes from the bus."""
+    def send(self, data: bytes) -> None:
+        """Takes bytes from the bus, as `Link.send`."""
+        self._move()
         for servo, instruction, parameters in self._decoder.feed(data):
             if instruction != Instruction.STATUS:
-                self._heard_s = self._now_s
-                self._obey(servo, instruction, parameters)
+                self._last_packet_s = self._now_s
+                self._execute(servo, instruction, parameters)
 
-    def advance(self, time_s: float) -> bytes:
-        """Moves for a time, s, and returns the bytes that are to be sent by then."""
-        self._now_s += time_s
+    def receive(self, timeout_s: float) -> bytes:
+        """Returns what the servos have answered by now, as `Link.receive`."""
+        until = self._clock() + max(timeout_s, 0.0)
+        while True:
+            self._move()
+            if self._answers and self._answers[0][0] <= self._now_s:
+                due = b""
+                while self._answers and self._answers[0][0] <= self._now_s and len(due) < MOST_READ // 2:
+                    due += self._answers.popleft()[1]
+                return due
+            if self._now_s >= until:
+                return b""
+            next_s = min(self._answers[0][0], until) if self._answers else until
+            self._sleep(next_s - self._now_s)
+
+    def close(self) -> None:
+        """Does nothing: there is no line to close."""
+
+    def _move(self) -> None:
+        """Brings the servos up to the present."""
+        now_s = self._clock()
+        time_s, self._now_s = now_s - self._now_s, now_s
         patience_s = WATCHDOG_UNIT_S * self._table[Register.WATCHDOG]
-        self._given_up |= (patience_s > 0) & (self._now_s - self._heard_s > patience_s)
-        # A servo whose watchdog has given up stays where it is, and takes no goal until that is written as 0.
-        moves = (self._table[Register.TORQUE] == 1) & ~self._given_up
+        self._watchdog_ended |= (patience_s > 0) & (now_s - self._last_packet_s > patience_s)
+        # A servo whose watchdog has ended the session stays where it is, and takes no goal until that is written as 0.
+        moves = (self._table[Register.TORQUE] == 1) & ~self._watchdog_ended
         share = -np.expm1(-time_s / self._lag_s)
         self.position += np.where(moves, share * (self._table[Register.GOAL] - self.position), 0.0)
-        due = b""
-        while self._answers and self._answers[0][0] <= self._now_s:
-            due += self._answers.popleft()[1]
-        return due
 
-    def _obey(self, servo: int, instruction: int, parameters: bytes) -> None:
+    def _execute(self, servo: int, instruction: int, parameters: bytes) -> None:
         mine = range(1, self._n + 1)
         head, rest = parameters[:4], parameters[4:]
         address, size = int.from_bytes(head[:2], "little"), int.from_bytes(head[2:], "little")
         match instruction:
             case Instruction.PING:
-                for each in mine if servo == EVERYONE else {servo} & set(mine):
+                for each in mine if servo == BROADCAST else {servo} & set(mine):
                     self._answer(each, 0, b"\x60\x04\x2d")
             case Instruction.READ if servo in mine and len(parameters) == 4:
                 self._read(servo, address, size)
-            case Instruction.SYNC_READ if servo == EVERYONE:
+            case Instruction.SYNC_READ if servo == BROADCAST:
                 for each in rest:
                     if each in mine:
                         self._read(each, address, size)
             case Instruction.WRITE if servo in mine and len(parameters) > 2:
                 self._answer(servo, self._write(servo, address, parameters[2:]), b"")
-            case Instruction.SYNC_WRITE if servo == EVERYONE and size > 0:
+            case Instruction.SYNC_WRITE if servo == BROADCAST and size > 0:
                 for start in range(0, len(rest) - size, size + 1):
                     if rest[start] in mine:
                         self._write(rest[start], address, rest[start + 1 : start + 1 + size])
@@ -143,8 +168,8 @@ class PseudoRobot:
         if value > (4095 if address == Register.GOAL else 127):
             return _DATA_RANGE_ERROR
         if address == Register.WATCHDOG and value == 0:
-            self._given_up[servo - 1] = False
-        elif address == Register.GOAL and self._given_up[servo - 1]:
+            self._watchdog_ended[servo - 1] = False
+        elif address == Register.GOAL and self._watchdog_ended[servo - 1]:
             return _DATA_RANGE_ERROR
         self._table[Register(address)][servo - 1] = value
         return 0
@@ -152,70 +177,3 @@ class PseudoRobot:
     def _answer(self, servo: int, error: int, data: bytes) -> None:
         status = packet(servo, Instruction.STATUS, bytes([error]) + data)
         self._answers.append((self._now_s + self._latency_s, status))
-
-
-def serve_terminal(robot: PseudoRobot, until: Callable[[], bool], opened: Callable[[str], object]) -> None:
-    """Puts a robot behind a new pseudo-terminal until told to end.
-
-    Args:
-        robot: The robot.
-        until: Whether to end, asked every 20 ms at least.
-        opened: Called with the path of the terminal once it is there.
-
-    Raises:
-        ConfigError: This system has no pseudo-terminals.
-    """
-    try:
-        import tty
-
-        ours, theirs = os.openpty()
-    except (ImportError, AttributeError, OSError):
-        raise ConfigError("this system has no pseudo-terminals: a pseudo-robot needs Linux or macOS") from None
-    try:
-        # Ours stays open, so that one host may leave and another come.
-        tty.setraw(theirs)
-        os.set_blocking(ours, False)
-        opened(os.ttyname(theirs))
-        before = monotonic()
-        while not until():
-            if select.select([ours], [], [], 0.0005)[0]:
-                robot.receive(os.read(ours, 4096))
-            now = monotonic()
-            answer = robot.advance(now - before)
-            before = now
-            if answer and select.select([], [ours], [], 0)[1]:
-                os.write(ours, answer)
-    finally:
-        os.close(ours)
-        os.close(theirs)
-
-
-@contextmanager
-def pseudo_robot(robot: PseudoRobot) -> Iterator[str]:
-    """Runs a robot behind a pseudo-terminal in a thread of its own, as long as the block runs.
-
-    Args:
-        robot: The robot.
-
-    Yields:
-        The path of the terminal.
-
-    Raises:
-        ConfigError: This system has no pseudo-terminals.
-    """
-    path: list[str] = []
-    is_there, is_over = threading.Event(), threading.Event()
-
-    def opened(name: str) -> None:
-        path.append(name)
-        is_there.set()
-
-    thread = threading.Thread(target=serve_terminal, args=(robot, is_over.is_set, opened), daemon=True)
-    thread.start()
-    try:
-        if not is_there.wait(5.0):
-            raise ConfigError("the pseudo-robot did not start: this system may have no pseudo-terminals")
-        yield path[0]
-    finally:
-        is_over.set()
-        thread.join()

@@ -247,7 +247,7 @@ def timing_values(partner: Partner, pace: Pace | None) -> Values:
     """Reads what `timing_signals` names."""
     values = {f"{partner.who}_latency": partner.latest_latency_s}
     if pace is not None:
-        values |= {"command_lateness": pace.latest_late_s, "missed_deadlines": float(pace.missed)}
+        values |= {"command_lateness": pace.late_s[-1] if pace.late_s else 0.0, "missed_deadlines": float(pace.missed)}
     return values
 
 

@@ -1,6 +1,8 @@
 """A robot of position servos on a bus in the manner of Dynamixel's protocol 2.0, a string potentiometer at each.
 
 The protocol and the registers (those of the X540 series) are described at https://emanual.robotis.com/docs/en/dxl/protocol2.
+The maker's `dynamixel-sdk` (4.1.0) is not used. Its sync read gives up all servos when one does not answer, drops the
+error byte by which a servo reports an overload, and polls the port for 34 ms and more before a time-out.
 """
 
 from __future__ import annotations
@@ -20,8 +22,8 @@ from annelid_lab.loop.links import Link
 from annelid_lab.loop.remote import PacedPlant
 from annelid_lab.loop.session import ANSWER, STOP_TRIES, STOP_WAIT_S, Limits, Pace, Partner
 
-MARK = b"\xff\xff\xfd"
-EVERYONE = 254
+HEADER = b"\xff\xff\xfd"
+BROADCAST = 254
 MOST_SERVOS = 252
 _MOST_BYTES = 2048
 WATCHDOG_UNIT_S = 0.02
@@ -48,31 +50,30 @@ class Register(IntEnum):
     POTENTIOMETER = 152
 
 
-def _table() -> list[int]:
-    table = []
-    for byte in range(256):
-        crc = byte << 8
-        for _ in range(8):
-            crc = (crc << 1) ^ (0x8005 if crc & 0x8000 else 0)
-        table.append(crc & 0xFFFF)
-    return table
+def _shifted(crc: int) -> int:
+    for _ in range(8):
+        crc = (crc << 1) ^ (0x18005 if crc & 0x8000 else 0)
+    return crc
 
 
-_CRC = _table()
+_CRC_OF_BYTE = [_shifted(byte << 8) for byte in range(256)]
 
 
 def crc16(data: bytes) -> int:
-    """Returns the checksum of a packet: CRC-16 of polynomial 0x8005, from 0, the highest bit first."""
+    """Returns the checksum of a packet: CRC-16 of polynomial 0x8005, from 0, the highest bit first.
+
+    The standard library's `binascii.crc_hqx` has another polynomial, 0x1021.
+    """
     crc = 0
     for byte in data:
-        crc = (crc << 8) & 0xFFFF ^ _CRC[crc >> 8 ^ byte]
+        crc = (crc << 8) & 0xFFFF ^ _CRC_OF_BYTE[crc >> 8 ^ byte]
     return crc
 
 
 def packet(servo: int, instruction: int, parameters: bytes = b"") -> bytes:
     """Returns a packet for the line."""
-    body = (bytes([instruction]) + parameters).replace(MARK, MARK + b"\xfd")
-    head = MARK + b"\0" + struct.pack("<BH", servo, len(body) + 2)
+    body = (bytes([instruction]) + parameters).replace(HEADER, HEADER + b"\xfd")
+    head = HEADER + b"\0" + struct.pack("<BH", servo, len(body) + 2)
     return head + body + struct.pack("<H", crc16(head + body))
 
 
@@ -90,7 +91,7 @@ class PacketDecoder:
     def feed(self, data: bytes) -> Iterator[tuple[int, int, bytes]]:
         """Yields servo, instruction and parameters of the valid packets that end in these bytes."""
         self._held += data
-        while (start := self._held.find(MARK + b"\0")) >= 0:
+        while (start := self._held.find(HEADER + b"\0")) >= 0:
             del self._held[:start]
             if len(self._held) < 7:
                 return
@@ -100,7 +101,7 @@ class PacketDecoder:
                 continue
             if len(self._held) < 7 + length:
                 # What a lost piece swallows ends at the next packet.
-                if (following := self._held.find(MARK + b"\0", 4)) >= 0:
+                if (following := self._held.find(HEADER + b"\0", 4)) >= 0:
                     self.rejected["a part missing"] += 1
                     del self._held[:following]
                     continue
@@ -110,7 +111,7 @@ class PacketDecoder:
                 self._skip("a wrong checksum")
                 continue
             del self._held[: len(whole)]
-            body = whole[7:-2].replace(MARK + b"\xfd", MARK)
+            body = whole[7:-2].replace(HEADER + b"\xfd", HEADER)
             yield whole[4], body[0], body[1:]
         del self._held[:-3]
 
@@ -241,13 +242,13 @@ class ServoPlant(PacedPlant):
     def _write(self, register: Register, size: int, values: list[int]) -> None:
         written = zip(self._ids, values, strict=True)
         data = b"".join(bytes([servo]) + value.to_bytes(size, "little", signed=size > 1) for servo, value in written)
-        self._link.send(packet(EVERYONE, Instruction.SYNC_WRITE, struct.pack("<HH", register, size) + data))
+        self._link.send(packet(BROADCAST, Instruction.SYNC_WRITE, struct.pack("<HH", register, size) + data))
 
     def _read(self, register: Register, wait_s: float, size: int = 2) -> Mapping[int, int]:
         """Reads a number of every servo; those that do not answer in time are left out."""
         asked = struct.pack("<HH", register, size) + bytes(self._ids)
         until = self._pace.clock() + wait_s
-        self._link.send(packet(EVERYONE, Instruction.SYNC_READ, asked))
+        self._link.send(packet(BROADCAST, Instruction.SYNC_READ, asked))
         found: dict[int, int] = {}
         while len(found) < self.n_muscles and (left := until - self._pace.clock()) > 0:
             for servo, instruction, parameters in self._decoder.feed(self._link.receive(left)):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import secrets
 import time
+from array import array
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -27,35 +28,13 @@ _ASK_EVERY_S = 0.5
 _AHEAD_S = 0.0005
 
 
-class Times:
-    """A distribution of times, to a microsecond, whose memory does not grow with the time."""
-
-    def __init__(self) -> None:
-        self._counts: Counter[int] = Counter()
-
-    @property
-    def n(self) -> int:
-        """How many there are."""
-        return self._counts.total()
-
-    def add(self, time_s: float) -> None:
-        """Takes one."""
-        # A second and more is too long for any loop, and its digits do not matter.
-        self._counts[round(1e6 * time_s if time_s < 1 else 1e5 * round(10 * time_s))] += 1
-
-    def percentile(self, share: float) -> float | None:
-        """Returns the least time that a share of them, in percent, do not exceed, s; None if there are none."""
-        needed = share / 100 * self.n
-        for microseconds, count in sorted(self._counts.items()):
-            needed -= count
-            if needed <= 1e-9:
-                return microseconds / 1e6
-        return None
-
-    def to_dict(self) -> dict[str, float | None]:
-        """Returns the percentiles that are reported, s."""
-        named = {"median": 50.0, "p99": 99.0, "p99_9": 99.9, "max": 100.0}
-        return {name: self.percentile(share) for name, share in named.items()}
+def percentiles(times_s: array[float]) -> dict[str, float | None]:
+    """Returns the percentiles of times that are reported, s; None where there are no times."""
+    shares = {"median": 50.0, "p99": 99.0, "p99_9": 99.9, "max": 100.0}
+    if not times_s:
+        return dict.fromkeys(shares)
+    found = np.percentile(times_s, [*shares.values()], method="inverted_cdf").tolist()
+    return dict(zip(shares, found, strict=True))
 
 
 @dataclass(slots=True)
@@ -66,7 +45,7 @@ class Pace:
         period_s: Period, s.
         clock: Time that never goes back, s.
         sleep: Waits so many seconds.
-        late: How long after its time each command left.
+        late_s: How long after its time each command left, s.
         missed: Deadlines that were missed: commands that left late, and periods without one.
         slipped_s: By how much the loop is behind the wall clock in all, s.
     """
@@ -74,10 +53,9 @@ class Pace:
     period_s: float
     clock: Callable[[], float] = time.perf_counter
     sleep: Callable[[float], None] = time.sleep
-    late: Times = field(default_factory=Times)
+    late_s: array[float] = field(default_factory=lambda: array("d"))
     missed: int = 0
     slipped_s: float = 0.0
-    latest_late_s: float = 0.0
     _due_s: float | None = None
 
     def tick(self) -> None:
@@ -89,12 +67,12 @@ class Pace:
         # A sleep ends some 0.1 ms late: the last bit is waited for awake.
         while (now := self.clock()) < due:
             pass
-        self.latest_late_s = late = now - due
-        self.late.add(late)
-        if late > ON_TIME * self.period_s:
-            self.missed += 1 + int(late / self.period_s)
-        if late >= self.period_s:
-            self.slipped_s += late
+        late_s = now - due
+        self.late_s.append(late_s)
+        if late_s > ON_TIME * self.period_s:
+            self.missed += 1 + int(late_s / self.period_s)
+        if late_s >= self.period_s:
+            self.slipped_s += late_s
             self._due_s = now
 
     def restart(self) -> None:
@@ -140,14 +118,15 @@ class Partner:
         who: "robot" or "firmware", for sentences and names.
         link: The line.
         pace: The clock.
-        latency: From a command to its answer.
+        latency_s: From each command to its answer, s; answers that were lost are left out.
+        latest_latency_s: Of the last command, s; NaN if its answer was lost.
         lost: Exchanges without a valid answer in time.
     """
 
     def __init__(self, who: str, link: Link, pace: Pace, watchdog: int) -> None:
         """Takes a line; after ``watchdog`` periods without an answer the loop stops."""
         self.who, self.link, self.pace, self.watchdog = who, link, pace, watchdog
-        self.latency = Times()
+        self.latency_s = array("d")
         self.latest_latency_s = math.nan
         self.lost = self._in_a_row = 0
         self._wrong: Counter[str] = Counter()
@@ -159,7 +138,7 @@ class Partner:
             SimulationStopped: None for too long.
         """
         if latency_s is not None:
-            self.latency.add(latency_s)
+            self.latency_s.append(latency_s)
             self.latest_latency_s, self._in_a_row = latency_s, 0
             self._wrong.clear()
             return
@@ -198,7 +177,7 @@ class Partner:
 
     def to_dict(self) -> dict[str, object]:
         """Returns what is reported."""
-        return {"latency_s": self.latency.to_dict(), "lost": self.lost}
+        return {"latency_s": percentiles(self.latency_s), "lost": self.lost}
 
 
 class WirePartner(Partner):

@@ -12,6 +12,7 @@ from pydantic import AfterValidator, Field, model_validator
 from annelid.arena import ROBOT, names_in, read_mjcf, stated_in, validator
 from annelid.config import BodyKind, Line, OwnModel
 from annelid.errors import listed, shown
+from annelid_lab.robots.cables import write_out
 
 if TYPE_CHECKING:
     from annelid.config import RunConfig
@@ -72,7 +73,7 @@ class MjcfBody(BodyKind):
         Raises:
             ConfigError: The file cannot be read, or has what a robot cannot have.
         """
-        xml = read_mjcf(path, ROBOT)
+        xml = read_mjcf(path, ROBOT, write_out)
         step_s = stated_in(xml, ROBOT, "option", "timestep")
         clock = {} if step_s is None else {"clock": {"physics_timestep_s": float(step_s)}}
         return {"body": {"kind": "mjcf", "xml": xml}, **clock}

@@ -287,7 +287,7 @@ def load_frame_command(
     annelid study load-frame --set body.strands.young_modulus_Pa=1e9 --set body.joints.dry_friction_Nm=0.01
     """
     from annelid.experiment import study_progress
-    from annelid_lab.calibration import load_frame as frame
+    from annelid_lab import calibration as frame
 
     table = output / "load_frame.csv"
     lock(output)
@@ -296,7 +296,7 @@ def load_frame_command(
     config = config_of(preset, overrides_of(assignments), fidelity=fidelity)
     with study_progress(quiet=quiet) as progress:
         report = None if progress is None else partial(progress, "load frame", 0, 0)
-        sizes = {"displacement_m": displacement * frame.MM, "speed_m_per_s": speed * frame.MM}
+        sizes = {"displacement_m": displacement * 1e-3, "speed_m_per_s": speed * 1e-3}
         tension = frame.load_frame(config, **sizes, progress=report)
     loop = frame.cable_force(tension, cable_friction)
     loops = {config.name: loop, "measured": measured}

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 from pydantic import AfterValidator, Field
 
 from annelid.arena.course import UP
-from annelid.arena.grammar import SCENE
-from annelid.arena.mjcf import object_names, read_mjcf, validator, with_contact
+from annelid.arena.mjcf import SCENE, object_names, validator, with_contact
+from annelid.arena.mjcf_files import read_mjcf
 from annelid.arena.surface import Plane, Surface
 from annelid.config.run import ArenaKind, RunConfig
 from annelid.config.sections import NonNegative

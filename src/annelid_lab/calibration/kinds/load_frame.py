@@ -12,8 +12,8 @@ from pydantic import Field
 from annelid.config import Line, NonNegative, Positive, RunConfig
 from annelid.protocols import Array
 from annelid.textfiles import read_text
-from annelid_lab.calibration.base import Data, Experiment, Found, beside, read_columns
-from annelid_lab.calibration.load_frame import Loop, cable_force, load_frame, loop_of_table, read_loop
+from annelid_lab.calibration.base import Data, Experiment, Found, file_beside, read_columns
+from annelid_lab.calibration.frame import Loop, cable_force, load_frame, loop_of_table, read_loop
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class LoadFrame(Experiment):
 
     def read(self, folder: Path) -> Data:
         """Reads forces, N, at even displacements, loading first; a table without a header is mm, N."""
-        path = beside(folder, self.data, f"experiments.{self.name}.data")
+        path = file_beside(folder, self.data, f"experiments.{self.name}.data")
         notes: tuple[str, ...] = ()
         first = read_text(path).lstrip()[:1] if path.suffix.lower() in (".csv", ".txt") else ""
         if first in tuple("-+.0123456789") and first:

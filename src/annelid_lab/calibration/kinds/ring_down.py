@@ -18,7 +18,7 @@ from annelid.body import WormBody
 from annelid.config import Length, Line, NonNegative, RunConfig
 from annelid.errors import ConfigError
 from annelid.protocols import Array
-from annelid_lab.calibration.base import Data, Experiment, Found, beside, binned, read_columns
+from annelid_lab.calibration.base import Data, Experiment, Found, binned, file_beside, read_columns
 
 
 class RingDown(Experiment):
@@ -33,7 +33,7 @@ class RingDown(Experiment):
 
     def read(self, folder: Path) -> Data:
         """Reads the displacement, m, over time, s."""
-        path = beside(folder, self.data, f"experiments.{self.name}.data")
+        path = file_beside(folder, self.data, f"experiments.{self.name}.data")
         columns, notes = read_columns(path, self.time, {self.displacement: "m"})
         at, values = binned(columns["time"] - columns["time"][0], columns[self.displacement], self.points)
         labels = ("time (s)", "displacement of the tip (m)")

@@ -18,7 +18,7 @@ from annelid.body import WormBody
 from annelid.config import Length, Line, Positive, RunConfig
 from annelid.errors import ConfigError
 from annelid.protocols import Array
-from annelid_lab.calibration.base import Data, Experiment, Found, beside, binned, read_columns
+from annelid_lab.calibration.base import Data, Experiment, Found, binned, file_beside, read_columns
 
 
 class Tensile(Experiment):
@@ -51,7 +51,7 @@ class Tensile(Experiment):
 
     def read(self, folder: Path) -> Data:
         """Reads force, N, over strain."""
-        path = beside(folder, self.data, f"experiments.{self.name}.data")
+        path = file_beside(folder, self.data, f"experiments.{self.name}.data")
         columns, notes = read_columns(path, self.time, {self.elongation: "m", self.force: "N"})
         strain = columns[self.elongation] / self.length_m
         kept = (strain > 0) & (strain <= self.largest_strain)

@@ -13,7 +13,7 @@ from pydantic import Field
 from annelid.config import Line, NonNegative, RunConfig
 from annelid.errors import ConfigError
 from annelid.protocols import Array
-from annelid_lab.calibration.base import FEWEST, Data, Experiment, Found, beside, binned
+from annelid_lab.calibration.base import FEWEST, Data, Experiment, Found, binned, file_beside
 from annelid_lab.logs.measured import Measured, read_map, read_measured
 
 
@@ -49,8 +49,8 @@ class Walk(Experiment):
 
     def read(self, folder: Path) -> Data:
         """Reads the signals of the log."""
-        log_map = read_map(beside(folder, self.map, f"experiments.{self.name}.map"))
-        path = beside(folder, self.data, f"experiments.{self.name}.data")
+        log_map = read_map(file_beside(folder, self.map, f"experiments.{self.name}.map"))
+        path = file_beside(folder, self.data, f"experiments.{self.name}.data")
         log = read_measured(path, log_map)
         points: list[tuple[Array, Array]] = []
         for name, series in log.values.items():

@@ -8,7 +8,6 @@ of the plug-in's moduli E and G, E pi r^4 / (4 L) and G pi r^4 / (2 L), straight
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections.abc import Callable
 from math import pi
 
 import numpy as np
@@ -25,11 +24,11 @@ TAKEN = {
     "plugin": frozenset(["plugin"]),
 }
 """Attributes of a cable's elements that are understood; those of its geom are the capsules'."""
-Numbers = Callable[[ET.Element, str, str], list[float]]
-"""Reads the numbers of an attribute, or of a default in its place; `ConfigError` where it has anything else."""
+MATERIAL = {"bend", "twist", "vmax"}
+"""What the plug-in may be told: two moduli, and one for colours."""
 
 
-def write_out(root: ET.Element, numbers: Numbers) -> None:
+def write_out(root: ET.Element) -> None:
     """Replaces every cable of a model by its bodies, named ``<prefix>B_first``, ``B_1`` .. ``B_last`` as the macro did.
 
     Raises:
@@ -39,13 +38,13 @@ def write_out(root: ET.Element, numbers: Numbers) -> None:
         for place, child in enumerate(list(parent)):
             if child.tag == "composite":
                 parent.remove(child)
-                parent.insert(place, _row(child, numbers))
+                parent.insert(place, _row(child))
     for extension in root.findall("extension"):
         if all(plugin.get("plugin") == PLUGIN for plugin in extension):
             root.remove(extension)
 
 
-def _row(cable: ET.Element, numbers: Numbers) -> ET.Element:
+def _row(cable: ET.Element) -> ET.Element:
     prefix, initial = cable.get("prefix", ""), cable.get("initial", "none")
     if cable.get("type") != "cable" or not cable.get("vertex") or initial not in ("none", "free"):
         raise ConfigError(
@@ -62,7 +61,7 @@ def _row(cable: ET.Element, numbers: Numbers) -> ET.Element:
         raise ConfigError(
             f"<composite prefix={shown(prefix)}>: the one plug-in of a cable is {PLUGIN}; others are code"
         )
-    given = numbers(cable, "vertex", "")
+    given = _numbers(cable, "vertex", "")
     if len(given) % 3 or not 9 <= len(given) <= 3 * MOST_VERTICES:
         raise ConfigError(
             f"<composite prefix={shown(prefix)}>: vertex must have three numbers of each of 3 to {MOST_VERTICES:,} "
@@ -70,11 +69,16 @@ def _row(cable: ET.Element, numbers: Numbers) -> ET.Element:
         )
     joint, geom = (_only(cable, tag) for tag in ("joint", "geom"))
     config = {one.get("key", ""): one for one in cable.iterfind("plugin/config")}
-    bend_Pa, twist_Pa = (numbers(config[key], "value", "")[0] if key in config else 0.0 for key in ("bend", "twist"))
-    radius_m = numbers(geom, "size", "0.005")[0]
+    if other := {key for key, one in config.items() if one.get("value") != "false"} - MATERIAL:
+        raise ConfigError(
+            f"<config key={shown(min(other))}>: a cable cannot have it; valid: {listed(sorted(MATERIAL))}. A reference "
+            "posture that is not the file's is not read"
+        )
+    bend_Pa, twist_Pa = (_numbers(config[key], "value", "0")[0] if key in config else 0.0 for key in ("bend", "twist"))
+    radius_m = _numbers(geom, "size", "0.005")[0]
     look = {name: value for name, value in geom.attrib.items() if name not in ("type", "size")}
     friction = {name: value for name, value in joint.attrib.items() if name != "kind"}
-    vertices, offset = np.array(given).reshape(-1, 3), np.array(numbers(cable, "offset", "0 0 0"))
+    vertices, offset = np.array(given).reshape(-1, 3), np.array(_numbers(cable, "offset", "0 0 0"))
     edges = np.diff(vertices, axis=0)
     if offset.shape != (3,) or not np.linalg.norm(edges, axis=1).all():
         raise ConfigError(
@@ -102,6 +106,16 @@ def _row(cable: ET.Element, numbers: Numbers) -> ET.Element:
         element = body
     assert first is not None
     return first
+
+
+def _numbers(element: ET.Element, name: str, default: str) -> list[float]:
+    try:
+        numbers = [float(word) for word in element.get(name, default).split()]
+    except ValueError:
+        numbers = []
+    if not numbers or not np.isfinite(numbers).all():
+        raise ConfigError(f"<{element.tag} {name}={shown(element.get(name))}>: must be numbers")
+    return numbers
 
 
 def _only(cable: ET.Element, tag: str) -> ET.Element:

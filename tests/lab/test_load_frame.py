@@ -12,8 +12,7 @@ import pytest
 from annelid.body.actuators.servo import wrap_factors
 from annelid.config import load_config
 from annelid.errors import AnnelidError, ConfigError, SimulationStopped
-from annelid_lab.calibration import load_frame as frame
-from annelid_lab.calibration.load_frame import Loop, cable_force, load_frame, read_loop
+from annelid_lab.calibration import Loop, cable_force, frame, load_frame, read_loop
 
 LOADING_N = [4.60, 6.16, 7.46, 9.55, 9.82, 11.49, 11.54, 12.17, 13.64, 14.27]
 UNLOADING_N = [-0.67, -0.06, 0.04, 0.42, 0.72, 0.89, 0.66, 0.91, 1.25, 2.01]

@@ -174,7 +174,7 @@ def load_frame(
         raise ConfigError(f"body.kind = {body.kind!r} has no ring cable; only the 3D worm (body.kind = 'worm') has")
     if not (0.0 < speed_m_per_s < np.inf and 1.0 <= haste < np.inf):
         raise ConfigError(f"speed = {speed_m_per_s:g} m/s must be greater than 0, and haste = {haste:g} at least 1")
-    model, tendons, corners = _compiled(_hastened(config, body, haste), body)
+    model, tendons, corners = _compiled(_sped_up(config, body, haste), body)
     data = mujoco.MjData(model)
     _steps(model, data, round(SETTLE_S / model.opt.timestep))
     _locate(model, data)
@@ -215,7 +215,7 @@ def load_frame(
     return Loop(x, tension)
 
 
-def _hastened(config: RunConfig, body: WormBody, haste: float) -> RunConfig:
+def _sped_up(config: RunConfig, body: WormBody, haste: float) -> RunConfig:
     """Returns the worm weightless and away from the ground, with its viscous coefficients divided."""
     damping = {"damping_time_s": body.strands.damping_time_s / haste}
     changed: dict[str, object] = {"strands": body.strands.model_copy(update=damping)}

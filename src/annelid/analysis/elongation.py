@@ -1,0 +1,100 @@
+"""How far segments elongate, read from the springs that are a worm's stretch sensors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike
+
+from annelid.analysis.numbers import finite, finite_each, number
+
+
+@dataclass(frozen=True, kw_only=True)
+class Elongation:
+    """How far segments elongate."""
+
+    elongation_first_helix_pp_m: list[float | None] | None = number(
+        "elongation on the first helix, peak to peak", "elongation, first helix, pp", 100.0, 2, "cm", per_segment=True
+    )
+    elongation_least_pp_m: list[float | None] | None = number(
+        "peak to peak of the sensor with which it is least",
+        "elongation, least sensor, pp",
+        100.0,
+        2,
+        "cm",
+        per_segment=True,
+    )
+    elongation_most_pp_m: list[float | None] | None = number(
+        "peak to peak of the sensor with which it is most",
+        "elongation, most sensor, pp",
+        100.0,
+        2,
+        "cm",
+        per_segment=True,
+    )
+    elongation_mean_max_m: list[float | None] | None = number(
+        "largest mean of the segment's sensors above rest",
+        "elongation, mean, maximum",
+        100.0,
+        2,
+        "cm",
+        per_segment=True,
+    )
+    middle_deficit: float | None = number(
+        "interior segments below the first, on the first helix", "middle below first, pp", 100.0, 1, "%"
+    )
+    middle_deficit_mean: float | None = number(
+        "interior segments below the first, mean of the sensors", "middle below first, mean", 100.0, 1, "%"
+    )
+    end_difference: float | None = number(
+        "last segment below the first, on the first helix", "last below first, pp", 100.0, 1, "%"
+    )
+
+
+def elongation(data: xr.Dataset) -> Elongation:
+    """Reads the elongation of every segment from a run's signals.
+
+    The paper does not say how it read its Fig. 7; its numbers come out as the peak to peak on the first helix.
+    """
+    if "stretch_length" not in data or not data.sizes.get("time"):
+        return Elongation()
+    stretch, rest = data["stretch_length"].values, data["stretch_rest_length"].values
+    peak_to_peak = np.ptp(stretch, axis=0)
+    first_helix, mean = peak_to_peak[:, 0], stretch.mean(axis=2).max(axis=0) - rest.mean(axis=1)
+    several = data.sizes["sensor"] > 1
+    return Elongation(
+        elongation_first_helix_pp_m=finite_each(first_helix),
+        elongation_least_pp_m=finite_each(peak_to_peak.min(axis=1)) if several else None,
+        elongation_most_pp_m=finite_each(peak_to_peak.max(axis=1)) if several else None,
+        elongation_mean_max_m=finite_each(mean),
+        middle_deficit=finite(middle_deficit(first_helix)),
+        middle_deficit_mean=finite(middle_deficit(mean)),
+        end_difference=finite(end_difference(first_helix)),
+    )
+
+
+def middle_deficit(elongation_m: ArrayLike) -> float:
+    """How far the interior segments stay below the first: ``1 - mean(interior) / first``, NaN if that is unmoved.
+
+    With three segments this is the paper's "segment 2 below segment 1" (39.4 %).
+    """
+    values = np.asarray(elongation_m, dtype=float)
+    return _deficit(values[1:-1].mean(), values[0])
+
+
+def interior_deficit(elongation_m: ArrayLike) -> float:
+    """How far the interior segments stay below both ends: ``1 - mean(interior) / mean(ends)``."""
+    values = np.asarray(elongation_m, dtype=float)
+    return _deficit(values[1:-1].mean(), (values[0] + values[-1]) / 2.0)
+
+
+def end_difference(elongation_m: ArrayLike) -> float:
+    """How far the last segment stays below the first: ``1 - last / first``."""
+    values = np.asarray(elongation_m, dtype=float)
+    return _deficit(values[-1], values[0])
+
+
+def _deficit(less: float, full: float) -> float:
+    return float(1.0 - less / full) if full > 0 else float("nan")

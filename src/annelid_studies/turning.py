@@ -66,6 +66,7 @@ class Reading:
     turn_deg_per_cycle: float  # Change of the heading
     curvature_per_m: float  # The same over the path
     radius_m: float  # Radius of the circle; infinite for a straight path
+    roll_deg: float  # Farthest that the body rolled about its length since the start, positive where its left side rose
     command: str  # The command line that makes the run
 
 
@@ -98,6 +99,7 @@ def turning(
                 turn_deg_per_cycle=math.degrees(turn.angle_rad) / turn.cycles,
                 curvature_per_m=turn.curvature_per_m,
                 radius_m=turn.radius_m,
+                roll_deg=math.degrees(track.roll_rad[np.abs(track.roll_rad).argmax()]),
                 command=case.command,
             )
         )
@@ -115,6 +117,7 @@ def turning_table(readings: Sequence[Reading]) -> TerminalTable:
         "speed (m/s)": lambda one: f"{one.speed_m_per_s:.3f}",
         "deg a cycle": lambda one: f"{one.turn_deg_per_cycle:.1f}",
         "radius (m)": lambda one: f"{one.radius_m:.2f}",
+        "rolled (deg)": lambda one: f"{one.roll_deg:.0f}",
     }
     return terminal_table(tabulated(readings, columns), "Turning")
 

@@ -7,7 +7,6 @@ from math import pi
 import numpy as np
 import pytest
 
-from annelid.body import mesh_of
 from annelid.body.formulations.rods import Rods
 from annelid.body.worm import WormBody
 from annelid.config import fields_of, load_config
@@ -140,7 +139,7 @@ def test_the_chain_s_joints_damp_as_in_the_paper_s_files() -> None:
     """0.12 N m s/rad in bending between two elements of a third of a side."""
     body = load_config("riddle2023").body
     assert isinstance(body, WormBody)
-    element_m = float(np.linalg.norm(np.diff(mesh_of(body.mesh).vertices_m[0], axis=0), axis=1).max())
+    element_m = float(np.linalg.norm(np.diff(body.geometry().vertices_m[0], axis=0), axis=1).max())
     joint = body.strands.damping_time_s * body.strands.bending_rigidity_Nm2 / element_m
     assert joint == pytest.approx(0.12, rel=1e-3)
 
@@ -211,7 +210,7 @@ def test_the_robots_have_the_authors_size_density_and_weight(
 ) -> None:
     config = load_config(preset)
     assert isinstance(config.body, WormBody)
-    geometry = mesh_of(config.body.mesh)
+    geometry = config.body.geometry()
     assert (geometry.n_segments, geometry.n_crossings) == (n_segments, n_crossings)
     assert geometry.length_m == pytest.approx(length_m, abs=0.002)
     strands = config.body.strands

@@ -17,8 +17,7 @@ from annelid.lazy import lazy
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from annelid.analysis import gait, summary
-    from annelid.body.estimates import Finding
-    from annelid.config import RunConfig, load_config, preset_names
+    from annelid.config import Finding, RunConfig, load_config, preset_names
     from annelid.draw.notebook import plot, video
     from annelid.experiment.sweep import sweep
     from annelid.nervous import Network

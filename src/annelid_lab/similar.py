@@ -11,7 +11,7 @@ from __future__ import annotations
 from math import ceil, log, pi, sqrt
 from typing import Any
 
-from annelid.body import Mesh, WormBody, bearable_force_N, build_spec, compile_spec, rhombus_of
+from annelid.body import Mesh, WormBody, bearable_force_N, build_spec, compile_spec, rhombus_of, worm_of
 from annelid.config import RunConfig, check_section, load_config, toml_value
 from annelid.errors import ConfigError, require_finite, require_positive
 from annelid.morphology import rhombus
@@ -56,8 +56,7 @@ def similar_worm(
         require_finite(length_m=length_m)
         require_positive(length_m=length_m)
     base = load_config(BASE)
-    known, arena = base.body, base.arena
-    assert isinstance(known, WormBody)
+    known, arena = worm_of(base), base.arena
     assert arena is not None
     # Checked before anything is computed from them.
     geometry = {"n_segments": n_segments, "n_helices": n_helices, "radius_m": radius_m}
@@ -132,9 +131,7 @@ def similar_worm(
     }
     # What follows from the whole mesh. The window was measured at the base's damping, which a similar worm's is.
     similar = load_config(BASE, _values(fields) | {"body.strands.damping_time_s": strands.damping_time_s})
-    body = similar.body
-    window = tolerance_window_m(similar)
-    assert isinstance(body, WormBody)
+    body, window = worm_of(similar), tolerance_window_m(similar)
     assert window is not None
     force = rings.forces(1)[0] * bearable_force_N(body) / bearable_force_N(known)
     low, high = window

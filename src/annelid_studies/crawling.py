@@ -15,7 +15,7 @@ import numpy as np
 from rich.table import Table as TerminalTable
 
 from annelid.analysis import mean_and_interval
-from annelid.body import WormBody
+from annelid.body import worm_of
 from annelid.config import load_config
 from annelid.draw import canvas, draw_lines, panel_title, save_both
 from annelid.errors import ConfigError
@@ -105,9 +105,7 @@ def changes_for(gait: str, quantity: Quantity, value: float) -> dict[str, Any]:
         ConfigError: The gait is unknown or no 3D worm's.
     """
     config = load_config(gait)
-    body = config.body
-    if not isinstance(body, WormBody):
-        raise ConfigError(f"{gait} is a planar worm: this study needs a 3D worm")
+    body = worm_of(config)
     if quantity == "friction":
         return {"arena.friction": value}
     n, before = int(value), body.n_segments
@@ -214,8 +212,8 @@ def variants(gait: str, effort: Effort) -> tuple[list[dict[str, Any]], dict[str,
         ConfigError: The gait is unknown or no 3D worm's.
     """
     config = load_config(gait)
-    if not isinstance(config.body, WormBody) or config.arena is None:
-        raise ConfigError(f"{gait} is a planar worm: this study needs a 3D worm")
+    if config.arena is None:
+        raise ConfigError(f"{gait} has no ground: this study needs a 3D worm")
     perturbed = drawn_frictions(config.arena.friction, PERTURBED[effort])
     half = finer_steps(config)[0]
     if effort == "quick":
@@ -223,9 +221,7 @@ def variants(gait: str, effort: Effort) -> tuple[list[dict[str, Any]], dict[str,
     # A quarter in two halvings: of 10 ms with control steps of 1 ms that is 2 ms.
     quarter = finer_steps(load_config(config.model_dump(), half))[0]
     names = ("element_more", "elements_more")
-    elements = {
-        name: {"body.mesh.elements_per_side": count} for name, count in zip(names, more_elements(config), strict=True)
-    }
+    elements = dict(zip(names, more_elements(config), strict=True))
     return perturbed, {"half_step": half, "quarter_step": quarter, **elements}
 
 

@@ -12,10 +12,9 @@ from hypothesis import strategies as st
 from annelid.analysis.passage import Passage, passage_through
 from annelid.analysis.track import Track
 from annelid.arena.kinds.pipe import Pipe
-from annelid.body import mesh_of
 from annelid.body.mesh import Mesh
 
-GEOMETRY = mesh_of(Mesh(n_segments=6, planes_between_rings=3, free_planes_at_ends=2))
+GEOMETRY = Mesh(n_segments=6, planes_between_rings=3, free_planes_at_ends=2).geometry()
 SPACING_M, RADIUS_M = 0.11, 0.12
 
 

@@ -11,16 +11,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from annelid.analysis.track import Track, track_of, turn_of
-from annelid.body import mesh_of
+from annelid.analysis.track import Track, track_of
 from annelid.body.mesh import Mesh
 from annelid.body.worm import WormBody
 from annelid.config import load_config
 from annelid.errors import RunFileError
 from annelid.simulation import simulate
+from annelid_studies.turning import turn_of
 
 MESH = Mesh(n_segments=6, planes_between_rings=3, free_planes_at_ends=2)
-GEOMETRY = mesh_of(MESH)
+GEOMETRY = MESH.geometry()
 N_PER_PLANE, RINGS = GEOMETRY.n_per_plane, tuple(GEOMETRY.ring_planes.tolist())
 PERIOD_S = 3.0
 
@@ -104,7 +104,7 @@ def test_rings_of_a_run_are_those_of_its_mesh(tmp_path: Path) -> None:
     config = load_config("riddle2023-rods", {"duration_s": 0.1})
     run = simulate(config, tmp_path / "run", progress=False)
     assert isinstance(config.body, WormBody)
-    geometry, track = mesh_of(config.body.mesh), track_of(run)
+    geometry, track = config.body.geometry(), track_of(run)
     assert track.ring_planes == tuple(geometry.ring_planes)
     first = run.data["crossing_position"].values[:, geometry.rings[0], :2].mean(axis=1)
     assert np.allclose(track.front_m, first, atol=1e-12)

@@ -13,7 +13,6 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from annelid.body import mesh_of
 from annelid.body.actuation import stretch_sensors
 from annelid.body.actuators.muscle import Rings
 from annelid.body.actuators.servo import ServoRings
@@ -199,7 +198,7 @@ def test_servos_may_differ_from_segment_to_segment() -> None:
 def test_side_sensors_are_the_leftmost_and_the_rightmost_springs(subtests: pytest.Subtests) -> None:
     for mesh in (Mesh(), Mesh(n_segments=5, planes_between_rings=3), Mesh(n_helices=8)):
         with subtests.test(f"{mesh!r:.60}"):
-            geometry = mesh_of(mesh)
+            geometry = mesh.geometry()
             every, sides = (stretch_sensors(geometry, Springs(sensors=which)) for which in ("all", "sides"))
             assert every is geometry.sensor_springs
             assert sides.shape == (mesh.n_segments, 2)

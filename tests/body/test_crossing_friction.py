@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from annelid.body import build_spec, mesh_of
+from annelid.body import build_spec
 from annelid.body.actuation import add_diagonal_friction
 from annelid.body.worm import WormBody
 from annelid.config import load_config
@@ -101,7 +101,7 @@ def test_a_torque_at_the_crossings_becomes_the_force_of_the_same_work() -> None:
         {"body.joints.dry_friction_Nm": torque, "body.joints.viscous_friction_Nms_per_rad": viscous},
     )
     assert isinstance(config.body, WormBody)
-    geometry = mesh_of(config.body.mesh)
+    geometry = config.body.geometry()
     model = build_spec(config).compile()
     lines = [i for i in range(model.ntendon) if model.tendon(i).name.startswith("diagonal_")]
     assert len(lines) == len(geometry.rhombi) == (len(geometry.plane_x_m) - 2) * 6

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from annelid.body import assemble, build_spec, compile_spec, mesh_of
+from annelid.body import assemble, build_spec, compile_spec
 from annelid.body.assemble import mjcf_text
 from annelid.body.formulations.rods.strains import net_stiffness
 from annelid.body.mesh import Strands
@@ -73,7 +73,7 @@ def contracted_plant(config: RunConfig, force_N: float, seconds: float) -> tuple
 def test_mass_and_rest_lengths_are_those_of_the_configuration(formulation: dict[str, Any]) -> None:
     config = worm(formulation, **{"body.mesh.n_segments": 5})
     assert isinstance(config.body, WormBody)
-    geometry = mesh_of(config.body.mesh)
+    geometry = config.body.geometry()
     model = build_spec(config).compile()
     strands = geometry.n_strands * geometry.strand_length_m * config.body.strands.one_number("linear_density_kg_per_m")
     pins = geometry.n_crossings * config.body.pins.one_number("mass_kg")

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from annelid.body import build_spec, mesh_of
+from annelid.body import build_spec
 from annelid.body.mesh import Mesh
 from annelid.config import load_config
 from annelid.morphology import helical_mesh
@@ -189,7 +189,7 @@ def test_every_field_of_the_mesh_shapes_it() -> None:
         "rear_overhang_m": 0.013,
     }
     assert set(fields) == set(Mesh.model_fields)
-    ours = mesh_of(Mesh.model_validate(fields))
+    ours = Mesh.model_validate(fields).geometry()
     expected = helical_mesh(fields.pop("n_segments"), **fields)  # type: ignore[arg-type]
     assert np.array_equal(ours.vertices_m, expected.vertices_m)
     assert np.array_equal(ours.rings, expected.rings)

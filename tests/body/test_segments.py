@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from annelid.body import build_spec, compile_spec, mesh_of
+from annelid.body import build_spec, compile_spec
 from annelid.body.assemble import mjcf_text
 from annelid.body.worm import WormBody
 from annelid.config import RunConfig, field_value, load_config
@@ -46,7 +46,7 @@ def body_of(config: RunConfig) -> WormBody:
 
 
 def mesh(config: RunConfig) -> MeshGeometry:
-    return mesh_of(body_of(config).mesh)
+    return body_of(config).geometry()
 
 
 def compiled(config: RunConfig) -> mujoco.MjModel:

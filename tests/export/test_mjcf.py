@@ -86,6 +86,6 @@ def test_a_worm_with_muscles_needs_no_keyframe() -> None:
 
 
 def test_planar_worms_have_no_model(planar_run: Run, tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match="no MuJoCo model"):
+    with pytest.raises(ConfigError, match="needs the 3D worm"):
         write_mjcf(planar_run, tmp_path / "worm.xml")
     assert not (tmp_path / "worm.xml").exists()

@@ -148,7 +148,7 @@ def test_a_ring_cannot_be_wound_away() -> None:
         load_frame(load_config("riddle2023-rods", RODS), displacement_m=0.9)
     with pytest.raises(ConfigError, match="haste = "):
         load_frame(load_config("riddle2023-rods", RODS), haste=0.5)
-    with pytest.raises(ConfigError, match="no ring cable"):
+    with pytest.raises(ConfigError, match="needs the 3D worm"):
         load_frame(load_config("riddle2022-planar"))
 
 

@@ -15,7 +15,6 @@ import pynwb
 import pytest
 
 from annelid import load_config, simulate
-from annelid.body import mesh_of
 from annelid.control import NetworkController
 from annelid.errors import RunFileError
 from annelid.export import Selection, find_format, selected
@@ -98,7 +97,8 @@ def test_every_number_is_read_back(which: str, request: pytest.FixtureRequest, t
 
 
 def test_segments_are_where_their_rings_are(rods_run: Run, target: Path) -> None:
-    mesh = mesh_of(rods_run.config.body.mesh)  # pyright: ignore[reportAttributeAccessIssue]
+    mesh = rods_run.config.body.geometry()
+    assert mesh is not None
     with read(rods_run, target) as file:
         position = file.processing["behavior"]["Position"]
         for segment, ring in enumerate(mesh.rings, start=1):

@@ -12,7 +12,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from annelid.analysis import lengthening_score, rhythm_score, summary
-from annelid.body import mesh_of
 from annelid.body.assemble import MOST_ORDERED_BODIES
 from annelid.body.worm import WormBody
 from annelid.config import RunConfig, load_config
@@ -30,7 +29,7 @@ def worm(*geometry: Any) -> RunConfig:
 
 def mesh_length(config: RunConfig) -> float:
     assert isinstance(config.body, WormBody)
-    return mesh_of(config.body.mesh).length_m
+    return config.body.geometry().length_m
 
 
 def test_the_base_is_similar_to_itself() -> None:
@@ -48,7 +47,7 @@ def test_a_tapering_worm_has_ranges_and_forces_ring_by_ring() -> None:
     body = config.body
     assert isinstance(body, WormBody)
     assert body.mesh.radii_m == pytest.approx([0.05, 0.0475, 0.045, 0.0425, 0.04])
-    shares = np.array(body.rings.length_ranges(5)) / mesh_of(body.mesh).ring_length_m[:, np.newaxis]
+    shares = np.array(body.rings.length_ranges(5)) / body.geometry().ring_length_m[:, np.newaxis]
     assert shares == pytest.approx(np.broadcast_to(shares[0], shares.shape), rel=1e-3)
     assert not check(config)
     with pytest.raises(ConfigError, match=r"radius_m.2 = -"):
@@ -83,7 +82,7 @@ def test_every_worm_passes_the_checks(
     strands_turn_rad = 2.0 * pi / n_helices / config.body.mesh.elements_per_side
     assert strands_turn_rad <= LARGEST_ANGLE_RAD + 1e-9
     # A vertex and an edge's twist of each element move.
-    assert 2 * len(mesh_of(config.body.mesh).vertices_m) < MOST_ORDERED_BODIES
+    assert 2 * len(config.body.geometry().vertices_m) < MOST_ORDERED_BODIES
     if length_m:
         assert mesh_length(config) == pytest.approx(length_m, rel=0.001)
 

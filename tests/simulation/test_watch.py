@@ -12,7 +12,6 @@ import pytest
 import xarray
 
 from annelid import load_config, open_run, simulate, summary
-from annelid.body import mesh_of
 from annelid.body.worm import WormBody
 from annelid.config import RunConfig
 from annelid.errors import ConfigError, SimulationStopped
@@ -45,11 +44,11 @@ class Looked:
     def __init__(self, preset: str = "riddle2023-rods", changes: dict[str, Any] | None = None) -> None:
         config = load_config(preset, changes)
         self.body = body_of(config)
-        self.watch = Watch(self.body, mesh_of(self.body.mesh), config.guard)
+        self.watch = Watch(self.body, self.body.geometry(), config.guard)
         self.n = config.body.n_segments * (1 if self.body.rings.layout == "whole" else 2)
         self.rest: dict[str, Any] = {
             "ring_length_m": np.full(self.n, 0.96 * config.body.n_segments / self.n),
-            "spring_length_m": mesh_of(self.body.mesh).spring_length_m,
+            "spring_length_m": self.body.geometry().spring_length_m,
             "depth_m": -0.01,
             "gap_m": 0.0,
             "activation": np.zeros(self.n),

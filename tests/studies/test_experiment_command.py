@@ -24,7 +24,7 @@ def test_load_frame_writes_a_table_and_its_picture(annelid: Command) -> None:
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (("study", "load-frame", "riddle2022-planar"), "no ring cable"),
+        (("study", "load-frame", "riddle2022-planar"), "needs the 3D worm"),
         (("study", "load-frame", "--displacement", "2000"), "four fifths"),
         (("study", "load-frame", "--data", "none.csv"), "cannot read none.csv"),
         (("calibrate", "--free", "yuong_modulus"), "did you mean 'young_modulus'"),

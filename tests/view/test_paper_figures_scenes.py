@@ -7,8 +7,6 @@ import imageio.v3
 import numpy as np
 import pytest
 
-from annelid.analysis.rhombi import actuated, rhombus_plane
-from annelid.body import mesh_of
 from annelid.body.worm import WormBody
 from annelid.config import load_config
 from annelid.draw.camera import picture_axes
@@ -30,6 +28,7 @@ from annelid_studies.riddle2023.figures.renderings import (
     rest_posture,
     rhombus_outline,
 )
+from annelid_studies.riddle2023.figures.rhombi import actuated, rhombus_plane
 
 LATE_S = 0.2
 needs_gl = pytest.mark.skipif(not rendering_works(), reason="no OpenGL back-end works on this machine")
@@ -45,7 +44,7 @@ def no_opengl(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def mesh(run: Run) -> MeshGeometry:
     assert isinstance(run.config.body, WormBody)
-    return mesh_of(run.config.body.mesh)
+    return run.config.body.geometry()
 
 
 def check_files(png: Path, *, rendered: bool) -> None:

@@ -10,11 +10,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from annelid.body import mesh_of
 from annelid.body.worm import WormBody
 from annelid.config import load_config
 from annelid.draw.overlay import Overlay, bar_length, length_name
-from annelid.draw.planar_scene import rhombi
 from annelid.draw.render import render_frame, render_strip, render_video
 from annelid.draw.scene import DrawnWorm, WormScene
 from annelid.errors import MissingDependency, RunFileError
@@ -23,17 +21,6 @@ from annelid.simulation.runfile import Run
 from annelid_studies.riddle2023.figures.renderings import rendering_works
 
 needs_gl = pytest.mark.skipif(not rendering_works(), reason="no OpenGL back-end works on this machine")
-
-
-def test_rhombi_touch_tip_to_tip_and_keep_their_sides() -> None:
-    side = 0.073
-    heights = np.array([0.065, 0.11, 0.09])
-    lengths = np.sqrt((2 * side) ** 2 - heights**2)
-    corners = rhombi(lengths, heights)
-    np.testing.assert_allclose(corners[:-1, 2], corners[1:, 0], atol=1e-15)
-    sides = np.linalg.norm(np.diff(np.concatenate([corners, corners[:, :1]], axis=1), axis=1), axis=2)
-    np.testing.assert_allclose(sides, side)
-    assert corners[0, 0, 0] == pytest.approx(-corners[-1, 2, 0]), "the middle of the worm is at the origin"
 
 
 def reddish(pixels: np.ndarray) -> np.ndarray:
@@ -204,7 +191,9 @@ def test_the_scale_bar_is_as_long_as_it_says(subtests: pytest.Subtests) -> None:
         with subtests.test(f"{width!r:.60}"):
             length_m = bar_length(width, pixels_per_m)
             assert length_name(length_m) == name
-            overlay = Overlay((width, 500), [("strand", (0.0, 0.0, 1.0), "line")], pixels_per_m, "black", "white")
+            overlay = Overlay(
+                (width, 500), [("strand", (0.0, 0.0, 1.0), "line")], pixels_per_m, "black", (1.0, 1.0, 1.0)
+            )
             drawn = overlay.stamped(np.full((500, width, 3), 255, dtype=np.uint8), "")
             dark = drawn[250:, width // 2 :].max(axis=2) < 60
             assert dark.sum(axis=1).max() == pytest.approx(length_m * pixels_per_m, abs=2)
@@ -258,7 +247,7 @@ def test_soft_crossings_have_a_bar_to_each_strand(subtests: pytest.Subtests) -> 
             worm.pose(worm.model.qpos0)
             scene = mujoco.MjvScene(worm.model, maxgeom=1000)
             worm.add_links(scene)
-            assert scene.ngeom == n_links * mesh_of(config.body.mesh).n_crossings
+            assert scene.ngeom == n_links * config.body.geometry().n_crossings
             assert ("soft" in worm.legend()[-1][0]) == (n_links > 0)
 
 

@@ -14,8 +14,7 @@ import numpy as np
 from annelid.analysis.muscles import cable_work, muscle_work
 from annelid.analysis.numbers import number, ratio
 from annelid.analysis.rhythm import run_rhythm
-from annelid.analysis.track import first_heading, fitted_circle, forward_position, track_of
-from annelid.body.worm import WormBody
+from annelid.analysis.track import first_heading, fitted_circle, track_of
 from annelid.protocols import Array
 from annelid.simulation.runfile import Run
 
@@ -135,7 +134,7 @@ def gait(run: Run) -> Gait:
         cost_of_transport_net=ratio(net_J, push_J),
         cost_of_transport_cables=ratio(cable_work(data), push_J),
         lateral_drift=ratio(float(left.sum()), forwards),
-        heading_change_rad=float(angles[-1] - angles[0]) if isinstance(run.config.body, WormBody) else None,
+        heading_change_rad=None if run.config.body.geometry() is None else float(angles[-1] - angles[0]),
         turning_radius_m=circle.signed_radius_m if circle is not None and circle.is_clear else None,
     )
 
@@ -151,42 +150,10 @@ def _steps(run: Run, marks: Array) -> tuple[Array, Array]:
     time = run.data["time"].values
     centre = run.data["center_of_mass"].sel(axis=["x", "y"]).values
     steps = np.diff(np.array([np.interp(marks, time, along) for along in centre.T]).T, axis=0)
-    if not isinstance(run.config.body, WormBody) or run.data.sizes.get("frame", 0) < 2:
+    if run.config.body.geometry() is None or run.data.sizes.get("frame", 0) < 2:
         return steps, np.broadcast_to(first_heading(run), steps.shape)
     track = track_of(run)
     # Evenly over each cycle, whatever the interval of the frames.
     times = marks[:-1, np.newaxis] + np.diff(marks)[:, np.newaxis] * np.linspace(0.0, 1.0, 64, endpoint=False)
     angle = np.interp(times, track.time_s, track.heading_rad).mean(axis=1)
     return steps, -np.array([np.cos(angle), np.sin(angle)]).T
-
-
-@dataclass(frozen=True, slots=True)
-class SlipCost:
-    """Speed and loss over complete cycles, from the second contraction of segment 1 to its last.
-
-    Attributes:
-        cycles: Number of complete cycles.
-        period_s: Mean duration of a cycle, s.
-        speed_m_per_s: Displacement of the centre of mass along the initial heading, over time, m/s.
-        loss_W: Work lost to friction over time, W.
-        loss_J_per_m: The same over that displacement, J/m; infinite for a worm that got nowhere or backwards.
-    """
-
-    cycles: int
-    period_s: float
-    speed_m_per_s: float
-    loss_W: float
-    loss_J_per_m: float
-
-
-def slip_cost(run: Run) -> SlipCost | None:
-    """Reads what a run that recorded ``slip_loss`` lost to friction; None for fewer than three contractions."""
-    marks = cycle_marks(run)
-    if len(marks) < 2:
-        return None
-    time, loss = run.data["time"].values, run.data["slip_loss"].values.sum(axis=1)
-    ends = np.searchsorted(time, marks[[0, -1]])
-    duration, travel, lost = (float(np.diff(each[ends])[0]) for each in (time, forward_position(run), loss))
-    cycles = len(marks) - 1
-    cost = lost / travel if travel > 0.0 else np.inf
-    return SlipCost(cycles, duration / cycles, travel / duration, lost / duration, cost)

@@ -10,7 +10,6 @@ from typing import Any
 
 from annelid.analysis.comparison import differing_fields, relative_difference
 from annelid.analysis.summary import NUMBERS, Summary
-from annelid.body.worm import WormBody
 from annelid.config import RunConfig, load_config, preset_names
 from annelid.config.run import published_worms
 from annelid.control.sns import paper_controller
@@ -124,12 +123,7 @@ def references(config: RunConfig) -> dict[str, Published]:
 def stands_for_the_papers(config: RunConfig) -> bool:
     """Tells whether a worm is of rods and of the paper's kind, to be compared with the paper's own formulation."""
     theirs = config.published == FORMULATION and bool(published(config))
-    return theirs and isinstance(config.body, WormBody) and not config.body.formulation.is_papers
-
-
-def has_rigid_crossings(config: RunConfig) -> bool:
-    """Tells whether a worm's strands share a vertex at each crossing."""
-    return isinstance(config.body, WormBody) and config.body.formulation.has_rigid_crossings
+    return theirs and not config.body.is_papers
 
 
 def changed_fields(config: RunConfig) -> tuple[str, list[str]]:

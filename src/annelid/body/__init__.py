@@ -18,12 +18,12 @@ if TYPE_CHECKING:
     from annelid.body.actuators import ActuatorKind
     from annelid.body.actuators.muscle import Rings, muscle_force
     from annelid.body.actuators.servo import ServoRings, motor_power_W, wrap_factors
-    from annelid.body.assemble import build_spec, compile_spec, mesh_of
+    from annelid.body.assemble import build_spec, compile_spec
     from annelid.body.estimates import bearable_force_N, rhombus_of
     from annelid.body.formulations import FormulationKind
     from annelid.body.formulations.rods import Rods
     from annelid.body.mesh import Mesh
-    from annelid.body.worm import WormBody
+    from annelid.body.worm import WormBody, worm_of
 
 # Every use of the engine begins here, and a mixed one fails with errors that explain nothing.
 refuse_mixed_engine()
@@ -40,13 +40,13 @@ __all__ = [
     "build_spec",
     "compile_spec",
     "crossing_site",
-    "mesh_of",
     "motor_power_W",
     "muscle_force",
     "rhombus_of",
     "ring_names",
     "stretch_sensors",
+    "worm_of",
     "wrap_factors",
 ]
 
-__getattr__, __dir__ = lazy(__name__)
+__getattr__, __dir__ = lazy(__name__, {"mesh_of": "a body's own method geometry() returns its mesh"})

@@ -18,11 +18,9 @@ from annelid.body.actuation import (
     add_springs,
     stretch_sensors,
 )
-from annelid.body.mesh import Mesh
-from annelid.body.worm import WormBody
+from annelid.body.worm import worm_of
 from annelid.config import RunConfig
 from annelid.errors import ConfigError
-from annelid.morphology import MeshGeometry, helical_mesh
 
 MOST_ORDERED_BODIES = 8192
 """Above this the engine's solver does not order its unknowns (docs/upstream/sparse_ordering.md)."""
@@ -34,11 +32,6 @@ _REMEDIES = {
     "too close": f"a part is too short: {_SHORT}",
 }
 """What the engine may say of a body whose every number is in its range, and the fields that it means."""
-
-
-def mesh_of(mesh: Mesh) -> MeshGeometry:
-    """Generates the geometry that a configuration asks for."""
-    return helical_mesh(**mesh.model_dump())
 
 
 def build_spec(config: RunConfig, *, for_plant: bool = False) -> mujoco.MjSpec:
@@ -58,12 +51,11 @@ def build_spec(config: RunConfig, *, for_plant: bool = False) -> mujoco.MjSpec:
         A spec of its own for every call; compile it as it is or a copy of it.
 
     Raises:
-        ConfigError: The body is planar and has no MuJoCo model.
+        ConfigError: The body is no 3D worm, of which alone annelid makes a MuJoCo model.
     """
-    body, arena = config.body, config.arena
-    if not isinstance(body, WormBody) or arena is None:
-        raise ConfigError(f"body.kind = {body.kind!r} has no MuJoCo model; only the 3D worm (body.kind = 'worm') has")
-    geometry = mesh_of(body.mesh)
+    body, arena = worm_of(config), config.arena
+    assert arena is not None
+    geometry = body.geometry()
     spec = mujoco.MjSpec()
     spec.modelname = config.name
     spec.compiler.degree = False
@@ -139,28 +131,27 @@ def mjcf_text(config: RunConfig, keyframes: Sequence[Mapping[str, Any]] = ()) ->
             f"arena.backward_friction = {config.arena.backward_friction} cannot be written as MJCF, whose friction is "
             "the same in both directions: leave it out or run the worm with annelid"
         )
-    spec = build_spec(config)
-    assert isinstance(config.body, WormBody)
-    if config.body.strands.stiffness_differs and spec.flexes:
+    spec, body = build_spec(config), worm_of(config)
+    if body.strands.stiffness_differs and spec.flexes:
         raise ConfigError(
             "body.strands: stiffness that differs along rods or among them cannot be written as MJCF, where a rod has "
             "one: take body.formulation.kind = 'chain', or run the worm with annelid"
         )
-    if config.body.heading_deg:
+    if body.heading_deg:
         raise ConfigError(
-            f"body.heading_deg = {config.body.heading_deg:g} cannot be written as MJCF, whose keyframes lack the "
+            f"body.heading_deg = {body.heading_deg:g} cannot be written as MJCF, whose keyframes lack the "
             "frames of turned rods: set it to 0, or run the worm with annelid"
         )
     # The springs that annelid senses, by the names under which it drives a robot of one's own.
-    for segment, springs in enumerate(stretch_sensors(mesh_of(config.body.mesh), config.body.springs)):
+    for segment, springs in enumerate(stretch_sensors(body.geometry(), body.springs)):
         for number, spring in enumerate(springs):
             add_length_sensor(spec, f"spring_{spring}", f"stretch_{segment}_{number}")
-    at_rest = config.body.rings.act_at_rest(spec)
+    at_rest = body.rings.act_at_rest(spec)
     rest = [{"name": "rest", "act": at_rest}] if len(at_rest) else []
     for keyframe in (*rest, *keyframes):
         spec.add_key(**{name: value for name, value in keyframe.items() if np.size(value)})
     compile_spec(spec)
-    lacks = config.body.formulation.lacks_in_mjcf(config.body)
+    lacks = body.formulation.lacks_in_mjcf(body)
     if lacks:
         warnings.warn(lacks, stacklevel=2)
     return spec.to_xml()

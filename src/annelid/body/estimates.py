@@ -16,12 +16,11 @@ account unless it is exceeded by more. Rings of that mesh collapse at 14 to 16 N
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from math import cos, hypot, tan
 from statistics import fmean
-from typing import Literal
 
 from annelid.body.mesh import MeshBody
+from annelid.config.run import Finding
 from annelid.morphology import Rhombus, rhombus
 
 HARDLY = 0.02
@@ -32,35 +31,6 @@ _BENDING = 1.3
 UNSURE = 2.0
 SHRUNK = 2 / 3
 """Length over that at rest to which actuators may draw a ring before anything is activated."""
-
-
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """Something wrong with a configuration.
-
-    Attributes:
-        field: Dotted path of the field to change.
-        value: Its value.
-        problem: What is wrong, in a sentence without a full stop.
-        instead: What to set instead, with a number.
-        severity: "error" where the run can mean nothing and is refused, "warning" where it is doubtful.
-    """
-
-    field: str
-    value: object
-    problem: str
-    instead: str
-    severity: Literal["error", "warning"] = "warning"
-
-    def __str__(self) -> str:
-        """Returns one sentence."""
-        return f"{self.field} = {_text(self.value)}: {self.problem}; {self.instead}"
-
-
-def _text(value: object) -> str:
-    if isinstance(value, list):
-        return f"[{', '.join(map(_text, value))}]"
-    return f"{value:g}" if isinstance(value, int | float) else str(value)
 
 
 def rhombus_of(body: MeshBody) -> Rhombus:

@@ -7,9 +7,11 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, field_validator
 
-from annelid.config.run import BodyKind
+from annelid.config.run import BodyKind, Elements
 from annelid.config.sections import Length, Modulus, NonNegative, PerSegmentOf, Positive, Section
+from annelid.morphology import MeshGeometry, helical_mesh
 
+MOST_ELEMENTS = 32
 RelativeFriction = Annotated[float, Field(ge=0.01, le=100)]
 
 
@@ -29,10 +31,10 @@ class Mesh(Section):
     angular_rate_rad_per_m: Annotated[float, Field(ge=1e-3, le=1e4)] = Field(
         default=14.0, description="turn of a strand per metre of body; the pitch is 2 pi over this"
     )
-    elements_per_side: Annotated[int, Field(ge=1, le=32)] = Field(
+    elements_per_side: Annotated[int, Field(ge=1, le=MOST_ELEMENTS)] = Field(
         default=3, description="straight elements between neighbouring crossings"
     )
-    elements_per_end: Annotated[int, Field(ge=1, le=32)] | None = Field(
+    elements_per_end: Annotated[int, Field(ge=1, le=MOST_ELEMENTS)] | None = Field(
         default=None, description="straight elements in each free end of a strand; default as many as in a side"
     )
     planes_between_rings: Annotated[int, Field(ge=2, le=50)] = Field(
@@ -57,6 +59,10 @@ class Mesh(Section):
     def radii_m(self) -> list[float]:
         """Radius of every ring at rest, m."""
         return self.of_each("radius_m", self.n_segments)
+
+    def geometry(self) -> MeshGeometry:
+        """Returns the mesh at rest."""
+        return helical_mesh(**self.model_dump())
 
 
 class Strands(Section):
@@ -170,10 +176,31 @@ class MeshBody(BodyKind):
     joints: Joints | None = None
     springs: Springs = Springs()
 
+    segments_field: ClassVar[str] = "body.mesh.n_segments"
+
     @property
     def n_segments(self) -> int:
         """Number of actuated segments."""
         return self.mesh.n_segments
+
+    def geometry(self) -> MeshGeometry:
+        """Returns the mesh at rest."""
+        return self.mesh.geometry()
+
+    @property
+    def first_heading_deg(self) -> float:
+        """As `heading_deg`."""
+        return self.heading_deg
+
+    @property
+    def first_sensor(self) -> str:
+        """Where the first stretch sensor of a segment lies."""
+        return self.springs.first_sensor
+
+    @property
+    def elements(self) -> Elements:
+        """Straight elements between neighbouring crossings."""
+        return Elements("body.mesh.elements_per_side", self.mesh.elements_per_side, MOST_ELEMENTS)
 
     @property
     def relative_frictions(self) -> list[float]:

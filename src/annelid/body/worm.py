@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from importlib import import_module
+from math import log, sqrt
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self, cast
 
 from pydantic import Field, model_validator
 
 from annelid.body.actuators import ActuatorKind
+from annelid.body.checks import ground_findings, material_findings, mesh_findings, tolerance_findings
+from annelid.body.estimates import rhombus_of
 from annelid.body.formulations import FormulationKind
 from annelid.body.mesh import MeshBody
 from annelid.config.kinds import Choice, default_of
-from annelid.config.run import RunConfig
+from annelid.config.run import Finding, RunConfig
 from annelid.config.sections import Section
-from annelid.errors import ConfigError, shown
+from annelid.errors import ConfigError, listed, shown
 from annelid.protocols import Plant
 
 if TYPE_CHECKING:
@@ -54,6 +58,67 @@ class WormBody(MeshBody):
     def has_halves(self) -> bool:
         """Whether its rings are halved."""
         return self.rings.layout == "halves"
+
+    @property
+    def is_papers(self) -> bool:
+        """As its formulation."""
+        return self.formulation.is_papers
+
+    @property
+    def has_rigid_crossings(self) -> bool:
+        """As its formulation."""
+        return self.formulation.has_rigid_crossings
+
+    @property
+    def step_cost_ms(self) -> float:
+        """About how long a physics step takes, ms: in proportion to segments and elements."""
+        return self.mesh.n_segments / 3 * self.mesh.elements_per_side / 3 * self.formulation.step_cost_ms
+
+    def findings(self, config: RunConfig) -> Iterator[Finding]:
+        """Checks lengths, forces, steps and tolerances against one another, each group of like segments by itself."""
+        assert config.arena is not None
+        groups, window = self.groups(), self.tolerance_window_m(config.arena.friction)
+        for segments, alike in groups:
+            alone = config.model_copy(update={"body": alike})
+            found = [*mesh_findings(alike), *alike.rings.findings(alike), *material_findings(alike)]
+            found += [*alike.formulation.findings(alone), *ground_findings(alone, alike)]
+            of = f"segment {listed(str(segment + 1) for segment in segments)}: " if len(groups) > 1 else ""
+            yield from (replace(one, problem=of + one.problem) for one in found)
+            yield from (replace(one, problem=of + one.problem) for one in tolerance_findings(config, alike, window))
+
+    def tolerance_window_m(self, friction: float) -> tuple[float, float] | None:
+        """Estimates between which tolerances of the stretch sensors the paper's controller walks in order, m.
+
+        Below, contracting neighbours lift a segment at rest out of its tolerance. Above, a segment that lets go is back
+        within it before the next has left it: all sensors say "at rest", and nothing contracts again. The middle of
+        both is the tolerance to set. Fitted to the paper's robot of rods under a timed wave, with moduli of 0.3 to 2
+        GPa, friction of 0.05 to 1 and damping times of 0.05 to 0.36 s, within 5 mm (docs/robust.md). The stiffness
+        enters as ``sqrt(EI / (k s^3))``, with the springs' rate k and the side s of a rhombus: stiffer strands spread a
+        contraction.
+
+        Args:
+            friction: Coefficient of the ground.
+
+        Returns:
+            How far neighbours lift a segment, and the length beyond rest at which the releasing and the next segment
+            are equally long; where the first is the larger, no tolerance is known to do. None for bodies that were not
+            measured: other than rods with rigid crossings, with a damping time of 0.05 to 0.4 s, muscles all round,
+            springs that are at rest as drawn, and segments that are alike.
+        """
+        if len(self.groups()) > 1 or self.strands.relative_stiffness is not None or self.relative_friction is not None:
+            return None
+        damping_s, rings, rate = self.strands.damping_time_s, self.rings, self.springs.one_number("stiffness_N_per_m")
+        measured = self.has_rigid_crossings and rings.muscle is not None and not self.has_halves
+        # Beyond what was measured the lines that were fitted say nothing.
+        if not measured or self.springs.rest_length_m is not None or not rate or not 0.05 <= damping_s <= 0.4:
+            return None
+        shape = rhombus_of(self)
+        spread = sqrt(self.strands.bending_rigidity_Nm2 / (rate * shape.side_m**3))
+        slippery = log(1.0 / min(max(friction, 0.05), 1.0))
+        most = shape.longest_m - shape.along_m
+        # Strands of less damping swing, which lifts neighbours as much.
+        lift = max(0.02, spread * (0.1242 + 0.9613 * max(damping_s, 0.145)) + 0.0401 * slippery - 0.0913)
+        return most * lift, most * (0.1581 + 0.0586 * spread + 0.5945 * damping_s)
 
     def groups(self) -> list[tuple[list[int], Self]]:
         """Groups the segments whose mesh, strands, pins and springs are alike.
@@ -157,3 +222,20 @@ class HelicalWorm(WormBody):
     """The 3D worm."""
 
     kind: Literal["worm"] = "worm"
+
+
+def worm_of(config: RunConfig) -> WormBody:
+    """Returns the body of a configuration, which must be a 3D worm.
+
+    Args:
+        config: The configuration.
+
+    Raises:
+        ConfigError: It is another body, without strands, rings and springs.
+    """
+    if not isinstance(config.body, WormBody):
+        raise ConfigError(
+            f"body.kind = {config.body.kind!r} has no strands, rings and springs: this needs the 3D worm "
+            "(body.kind = 'worm')"
+        )
+    return config.body

@@ -200,8 +200,7 @@ def config_of(
     # An empty name, as from an unset variable of a shell, must not pass for none.
     source = (RIGID_PRESET if refitting else FIRST_PRESET) if preset is None else preset
     if segments is not None:
-        planar = load_config(source).body.is_planar
-        overrides |= {"body.n_segments" if planar else "body.mesh.n_segments": segments}
+        overrides |= {load_config(source).body.segments_field: segments}
     config = load_config(source, overrides, fidelity=fidelity, arena=arena)
     if preset is None and refitting:
         fitted = f"{FIRST_PRESET} is fitted to three segments, its mesh and its step"

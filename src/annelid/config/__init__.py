@@ -32,7 +32,7 @@ from annelid.config.loading import (
     preset_names,
     preset_text,
 )
-from annelid.config.run import ArenaKind, BodyKind, ControllerKind, OwnModel, RunConfig, TurningKind
+from annelid.config.run import ArenaKind, BodyKind, ControllerKind, Elements, Finding, OwnModel, RunConfig, TurningKind
 from annelid.config.sections import Length, Line, NonNegative, Positive, Section, Share
 from annelid.config.settings import Clock, Guard, Record, StretchSensor
 from annelid.config.study import Study, Vary, load_study
@@ -46,7 +46,9 @@ __all__ = [
     "Choice",
     "Clock",
     "ControllerKind",
+    "Elements",
     "Fidelity",
+    "Finding",
     "Guard",
     "Kind",
     "Knob",

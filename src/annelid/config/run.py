@@ -6,10 +6,11 @@ These belong together: a run is made of kinds, and a kind is checked against its
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from functools import cache
 from importlib import resources
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
@@ -25,7 +26,8 @@ if TYPE_CHECKING:
 
     from annelid.arena.course import Bore, Course
     from annelid.arena.surface import Shape, Surface
-    from annelid.protocols import Controller, Plant, Steering
+    from annelid.morphology import MeshGeometry
+    from annelid.protocols import Array, Controller, Plant, Steering, Values
 
 MOST_SAMPLES = 10_000_000
 Friction = Annotated[float, Field(ge=0.01, le=100)]
@@ -155,15 +157,66 @@ class TurningKind(Checked, Kind):
         """
 
 
+class Elements(NamedTuple):
+    """How finely a body is divided.
+
+    Attributes:
+        field: Dotted path of the field that says it.
+        number: Its value.
+        most: The greatest that is allowed.
+    """
+
+    field: str
+    number: int
+    most: int
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """Something wrong with a configuration.
+
+    Attributes:
+        field: Dotted path of the field to change.
+        value: Its value.
+        problem: What is wrong, in a sentence without a full stop.
+        instead: What to set instead, with a number.
+        severity: "error" where the run can mean nothing and is refused, "warning" where it is doubtful.
+    """
+
+    field: str
+    value: object
+    problem: str
+    instead: str
+    severity: Literal["error", "warning"] = "warning"
+
+    def __str__(self) -> str:
+        """Returns one sentence."""
+        return f"{self.field} = {_text(self.value)}: {self.problem}; {self.instead}"
+
+
+def _text(value: object) -> str:
+    if isinstance(value, list):
+        return f"[{', '.join(map(_text, value))}]"
+    return f"{value:g}" if isinstance(value, int | float) else str(value)
+
+
 class BodyKind(Checked, Kind):
-    """Base of the bodies' sections.
+    """Base of the bodies' sections: what analysis, pictures, views, exports and checks ask a body.
+
+    A body has one of three shapes: the mesh of a 3D worm (`geometry`), the model of a robot (`own_model`), or that of a
+    planar body, which moves along x and z (`outlines`).
 
     Attributes:
         needs_arena: Whether it stands on an arena, the default one where none is given.
-        is_planar: Whether it is a planar worm: rhombi in a row.
+        is_planar: Whether it moves in one plane, and is drawn from its side.
         has_skin: Whether the sides of its segments feel touch.
         touches_ground: Whether anything of the body bears on a ground or a wall.
         can_be_pushed: Whether a trial may push it.
+        is_papers: Whether it is in the paper's own formulation, which others are compared with.
+        has_rigid_crossings: Whether the two strands of a crossing share a point.
+        segments_field: Dotted path of the field that says how many segments it has.
+        frame_size: Width and height of a picture, pixels.
+        video_size: The same of a video, multiples of 16, as its codec likes them.
         n_segments: Actuated segments.
     """
 
@@ -174,6 +227,63 @@ class BodyKind(Checked, Kind):
     has_skin: ClassVar[bool] = False
     touches_ground: ClassVar[bool] = True
     can_be_pushed: ClassVar[bool] = False
+    segments_field: ClassVar[str] = "body.n_segments"
+    frame_size: ClassVar[tuple[int, int]] = (1280, 800)
+    video_size: ClassVar[tuple[int, int]] = (960, 544)
+
+    @property
+    def is_papers(self) -> bool:
+        """As the class says."""
+        return False
+
+    @property
+    def has_rigid_crossings(self) -> bool:
+        """As the class says."""
+        return False
+
+    def geometry(self) -> MeshGeometry | None:
+        """Returns the mesh at rest; None for a body that is no mesh of strands."""
+        return None
+
+    def outlines(self, values: Values) -> Array:
+        """Returns where the sides of the segments of a planar body are.
+
+        Args:
+            values: The signals that it records, by name: of one instant, or of many along a first axis.
+
+        Returns:
+            Corners of every segment in the order in which they are drawn, x and z, m, ``(.., n_segments, n_corners,
+            2)``.
+        """
+        raise NotImplementedError(f"body.kind = {self.kind!r} gives no outlines")
+
+    @property
+    def first_heading_deg(self) -> float:
+        """Where it leads at the start: 0 is towards -x, positive to its left."""
+        return 0.0
+
+    @property
+    def first_sensor(self) -> str:
+        """Where the first of a segment's stretch sensors lies, in words; empty where there is but one."""
+        return ""
+
+    @property
+    def elements(self) -> Elements | None:
+        """How finely it is divided; None where that means nothing."""
+        return None
+
+    @property
+    def step_cost_ms(self) -> float:
+        """About how long a physics step takes on one core, ms."""
+        return 0.05
+
+    def findings(self, config: RunConfig) -> Iterator[Finding]:
+        """Checks the numbers of a run against one another, before anything is computed; by default finds nothing.
+
+        Args:
+            config: The configuration that the section is of.
+        """
+        yield from ()
 
     def refuse_fidelity(self, level: str) -> None:
         """Refuses a level of fidelity (`annelid.config.fidelity`) where it was not measured.

@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from annelid.draw.gl import find_backend
     from annelid.draw.overlay import legend_handle
     from annelid.draw.page import html_page
-    from annelid.draw.planar_scene import bent_rhombi, rhombi
     from annelid.draw.plots import figure7, plot_path
     from annelid.draw.render import DEFAULT_CAMERA, render_frame, render_video
     from annelid.draw.scene import CONTRACTED_WIDTH, SPRING_RGBA, Skeleton, WormScene, postures_of, render_still
@@ -53,7 +52,6 @@ __all__ = [
     "Skeleton",
     "WormScene",
     "activation_color",
-    "bent_rhombi",
     "canvas",
     "comparison_table",
     "draw_lines",
@@ -79,7 +77,6 @@ __all__ = [
     "render_frame",
     "render_still",
     "render_video",
-    "rhombi",
     "save",
     "save_both",
     "segment_colors",
@@ -87,4 +84,6 @@ __all__ = [
     "uncertainty_figure",
 ]
 
-__getattr__, __dir__ = lazy(__name__, {"Mark": "progress_figure takes the values of the trials"})
+__getattr__, __dir__ = lazy(
+    __name__, {"Mark": "progress_figure takes the values of the trials"}, ("annelid_studies.planar",)
+)

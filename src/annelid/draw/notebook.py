@@ -13,7 +13,7 @@ from annelid.analysis import summary
 from annelid.draw.figures import RUN_FIGURES
 from annelid.draw.gallery import VIDEO_TASK, frame_time_s, task_bar
 from annelid.draw.plots import figure7, plot_path
-from annelid.draw.render import VIDEO_SIZE, render_frame, render_video
+from annelid.draw.render import render_frame, render_video
 from annelid.draw.table import COMPARED, closing_sentence, legend, summary_rows
 from annelid.errors import AnnelidError
 from annelid.simulation.runfile import VIEWS, Run, open_run
@@ -141,7 +141,7 @@ def _still(run: Run) -> str:
     with TemporaryDirectory() as folder:
         file, below = Path(folder) / "run.png", ""
         try:
-            render_frame(run, frame_time_s(run), file, size=VIDEO_SIZE[run.config.body.kind])
+            render_frame(run, frame_time_s(run), file, size=run.config.body.video_size)
         except AnnelidError as error:
             below = _paragraph(f"The worm is not drawn: {error}")
             figure7(run, file)

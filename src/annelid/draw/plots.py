@@ -9,7 +9,6 @@ import numpy as np
 
 from annelid.analysis.paper import published
 from annelid.analysis.rhythm import CONTRACTED, segment_activation, stretches
-from annelid.body.worm import WormBody
 from annelid.draw.canvas import canvas, line_entries, line_looks, panel_title, plain, save
 from annelid.draw.figures import RUN_FIGURES
 from annelid.errors import RunFileError
@@ -130,8 +129,8 @@ def _lengths(axes: Axes, run: Run, looks: list[dict]) -> None:
     axes.axhline(rest, color="0.35", linewidth=0.6)
     _name_level(axes, rest, "at rest")
     entries: list[tuple] = [("0.25", "-", _THICK, "mean of its sensors" if several else "sensor")]
-    if several and isinstance(run.config.body, WormBody):
-        entries.append(("0.25", "-", _THIN, run.config.body.springs.first_sensor))
+    if several and run.config.body.first_sensor:
+        entries.append(("0.25", "-", _THIN, run.config.body.first_sensor))
     levels = _published_levels(run)
     if levels:
         _draw_levels(axes, levels, looks)

@@ -1,6 +1,6 @@
 """Frames and videos from a run's recorded states: later, and on any machine.
 
-The 3D worm is drawn by MuJoCo and needs OpenGL; the planar worms are drawn by matplotlib and do not.
+The 3D worm is drawn by MuJoCo and needs OpenGL; planar bodies are drawn by matplotlib and do not.
 """
 
 from __future__ import annotations
@@ -16,9 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from annelid.analysis.gait import cycle_marks
-from annelid.analysis.rhombi import nearest_time
+from annelid.analysis.track import nearest_time
 from annelid.draw.canvas import WIDTH_IN, canvas, save
-from annelid.draw.overlay import background_of, legend_handle, length_name
 from annelid.errors import MissingDependency, RunFileError
 from annelid.output import whole_file, with_suffix
 from annelid.simulation.runfile import Run
@@ -27,21 +26,6 @@ if TYPE_CHECKING:
     from annelid.draw.planar_scene import PlanarScene
     from annelid.draw.scene import WormScene
 
-FRAME_SIZE = {
-    "worm": (1280, 800),
-    "mjcf": (1280, 800),
-    "riddle2022": (1280, 560),
-    "daltorio2013": (1280, 320),
-    "boxerbaum2012": (1280, 320),
-}
-VIDEO_SIZE = {
-    "worm": (960, 544),
-    "mjcf": (960, 544),
-    "riddle2022": (960, 432),
-    "daltorio2013": (960, 256),
-    "boxerbaum2012": (960, 256),
-}
-"""Width and height in pixels by the kind of body; a video's are multiples of 16, as its codec likes them."""
 FRAME_SUFFIXES = (".png", ".jpg", ".jpeg")
 STRIP_SUFFIXES = (".png", ".pdf", ".svg")
 STRIP_SIZE = (840, 525)
@@ -81,7 +65,7 @@ def render_frame(
         path: Picture to write (``.png``, ``.jpg``).
         camera: Name of a view of the 3D worm, see `annelid.draw.camera.VIEWS_DEG`; by default isometric.
         background: ``white`` or ``dark``; by default a floor with squares of 10 cm, or, of a planar worm, white.
-        size: Width and height, pixels; by default `FRAME_SIZE`.
+        size: Width and height, pixels; by default as the body says.
 
     Returns:
         The path written.
@@ -94,7 +78,7 @@ def render_frame(
     import imageio.v3
 
     path = with_suffix(path, FRAME_SUFFIXES, "a picture")
-    size = size or FRAME_SIZE[run.config.body.kind]
+    size = size or run.config.body.frame_size
     with _scene(run, size, camera, background, fine=True) as scene:
         pixels = scene.picture(nearest_time(run, scene.times_s, time_s))
     with whole_file(path) as draft:
@@ -123,9 +107,11 @@ def render_strip(
         The path written.
 
     Raises:
-        RunFileError: As of `render_frame`, the worm is planar, or ``n_frames`` is out of range.
+        RunFileError: As of `render_frame`, the body is planar, or ``n_frames`` is out of range.
         RenderingUnavailable: No OpenGL back-end works.
     """
+    from annelid.draw.overlay import background_of, legend_handle, length_name
+
     path = with_suffix(path, STRIP_SUFFIXES, "a strip of frames")
     fewest, most = STRIP_RANGE
     if not fewest <= n_frames <= most:
@@ -180,7 +166,7 @@ def render_video(
         speed: Simulated seconds per second of video: 1 is real time, 0.25 a quarter of it.
         camera: Name of a view of the 3D worm, see `annelid.draw.camera.VIEWS_DEG`; by default isometric.
         background: As in `render_frame`.
-        size: Width and height, pixels, multiples of 16; by default `VIDEO_SIZE`, of a GIF half of it.
+        size: Width and height, pixels, multiples of 16; by default as the body says, of a GIF half of it.
         progress: Called after every frame.
 
     Returns:
@@ -199,7 +185,7 @@ def render_video(
     if not 0 < speed < math.inf:
         raise RunFileError(f"speed = {speed:g}: the speed of a video must be positive and finite")
     if size is None:
-        width, height = VIDEO_SIZE[run.config.body.kind]
+        width, height = run.config.body.video_size
         # A GIF is large for what it shows, and so it is drawn smaller.
         size = (width // 2, height // 2) if path.suffix.lower() == ".gif" else (width, height)
     with _scene(run, size, camera, background, fine=False) as scene, whole_file(path) as draft:
@@ -225,10 +211,11 @@ def _scene(
 ) -> WormScene | PlanarScene:
     if not run.config.body.is_planar:
         return _worm_scene(run, size, camera, background, fine=fine, words=True)
+    from annelid.draw.overlay import background_of
     from annelid.draw.planar_scene import PlanarScene
 
     if camera is not None:
-        raise RunFileError(f"camera {camera!r} does not apply: a planar worm has one view only")
+        raise RunFileError(f"camera {camera!r} does not apply: a planar body has one view only")
     if background is not None:
         background_of(background)
     return PlanarScene(run, *size, dark=background == "dark")

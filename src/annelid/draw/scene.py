@@ -11,15 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from annelid.arena.geoms import GROUND_RGBA, PLAIN_RGBA, add_looks
-from annelid.body import build_spec, mesh_of
+from annelid.body import build_spec, worm_of
 from annelid.body.actuation import crossing_site, ring_names
 from annelid.body.formulations.rods.net import STRAND_RGBA
 from annelid.body.rows import tied_bodies
-from annelid.body.worm import WormBody
 from annelid.config import RunConfig
 from annelid.draw.camera import FIELD_OF_VIEW_DEG, FIXED, fitting_distance, picture_points, view_angles
 from annelid.draw.canvas import CONTRACTED, activation_color
-from annelid.draw.gl import Canvas, find_backend
+from annelid.draw.gl import Canvas
 from annelid.draw.overlay import BRIGHT, DIM, Background, Entry, Overlay, background_of, bar_length
 from annelid.errors import RunFileError
 from annelid.protocols import Array
@@ -53,7 +52,7 @@ class DrawnWorm:
     """
 
     def __init__(self, config: RunConfig, background: str = "floor") -> None:
-        assert isinstance(config.body, WormBody)
+        body = worm_of(config)
         self._behind = background_of(background)
         spec = build_spec(config)
         _light(spec, self._behind)
@@ -63,13 +62,13 @@ class DrawnWorm:
         self.model = model = spec.compile()
         self._has_waypoints = config.turning is not None and bool(config.turning.goals.points_m)
         # What is drawn of springs, cables and crossings must not hide the mesh of a small worm.
-        radius_m = max(config.body.mesh.radii_m)
+        radius_m = max(body.mesh.radii_m)
         model.tendon_width *= DRAWN_WIDTH * radius_m
-        self._balls = np.array([model.geom(crossing_site(i)).id for i in range(mesh_of(config.body.mesh).n_crossings)])
+        self._balls = np.array([model.geom(crossing_site(i)).id for i in range(body.geometry().n_crossings)])
         model.geom_rgba[self._balls] = self._behind.ball
         ball_m = model.geom_size[self._balls, 0]
         ball_m = np.minimum(ball_m, LARGEST_BALL * radius_m)
-        model.geom_size[self._balls, 0] = np.maximum(ball_m, SMALLEST_BALL * config.body.strands.radius_m)
+        model.geom_size[self._balls, 0] = np.maximum(ball_m, SMALLEST_BALL * body.strands.radius_m)
         self._in_scene = in_scene(model)
         connects = model.eq_objtype == mujoco.mjtObj.mjOBJ_BODY.value
         connects &= model.eq_type == mujoco.mjtEq.mjEQ_CONNECT.value
@@ -80,7 +79,7 @@ class DrawnWorm:
         self._link_places = np.concatenate([places, np.zeros((len(tied), 2, 3))])
         self.posture = mujoco.MjData(self.model)
         self.upright = upright(config)
-        self._rings = [self.model.tendon(name).id for name in ring_names(config.body.n_segments, config.body.rings)]
+        self._rings = [self.model.tendon(name).id for name in ring_names(body.n_segments, body.rings)]
         self._widths = self.model.tendon_width[self._rings]
 
     def pose(self, qpos: NDArray[np.floating], activation: NDArray[np.floating] | None = None) -> None:
@@ -202,8 +201,7 @@ class _Scene(Canvas):
         background: str = "floor",
         words: bool = True,
     ) -> None:
-        sky = background == "floor"
-        super().__init__(worm.model, *size, find_backend(), fine=fine, sky=sky, upright=upright)
+        super().__init__(worm.model, *size, fine=fine, upright=upright)
         self._worm = worm
         self.legend = worm.legend()
         self.pixels_per_m = size[1] / (2.0 * math.tan(math.radians(FIELD_OF_VIEW_DEG) / 2) * distance_m)
@@ -240,8 +238,8 @@ class WormScene(_Scene):
         words: bool = True,
     ) -> None:
         body = run.config.body
-        angles = view_angles(camera, body.heading_deg if isinstance(body, WormBody) else 0.0)
-        worm = DrawnWorm(run.config, background) if isinstance(body, WormBody) else DrawnRobot(run.config, background)
+        angles = view_angles(camera, body.first_heading_deg)
+        worm = (DrawnWorm if body.own_model is None else DrawnRobot)(run.config, background)
         self.times_s: Array = run.data["frame_time"].values
         self._qpos = postures_of(run, worm.model.nq)
         self._activation = run.data["activation"]
@@ -274,9 +272,8 @@ class PostureScene(_Scene):
     """
 
     def __init__(self, config: RunConfig, width: int, height: int, camera: str) -> None:
-        assert isinstance(config.body, WormBody)
         # The model's own rest has no heading.
-        angles, headed = view_angles(camera), view_angles(camera, config.body.heading_deg)
+        angles, headed = view_angles(camera), view_angles(camera, config.body.first_heading_deg)
         worm = DrawnWorm(config)
         points = worm.part_ends(worm.model.qpos0)
         offsets = (points - _middle(points)) @ worm.upright.T
@@ -434,7 +431,7 @@ def _set_fog(model: mujoco.MjModel, start_m: float, end_m: float) -> None:
 
 
 def _light(spec: mujoco.MjSpec, behind: Background, material: str = "floor") -> None:
-    """Gives a model a picture's lens and light, and its floor a colour."""
+    """Gives a model a picture's lens and light, and floor and sky the colours of the background."""
     visual = spec.visual
     visual.global_.fovy = FIELD_OF_VIEW_DEG
     visual.headlight.diffuse = [HEADLIGHT] * 3
@@ -447,6 +444,10 @@ def _light(spec: mujoco.MjSpec, behind: Background, material: str = "floor") -> 
         floor = spec.material(material)
         floor.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = ""
         floor.rgba = [*behind.floor, 1.0]
+        for texture in spec.textures:
+            if texture.type == mujoco.mjtTexture.mjTEXTURE_SKYBOX:
+                texture.builtin = mujoco.mjtBuiltin.mjBUILTIN_FLAT
+                texture.rgb1 = texture.rgb2 = behind.haze
     visual.map.fogstart, visual.map.fogend = 4.0, 12.0
     for light in spec.lights:
         light.type = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL

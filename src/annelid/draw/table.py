@@ -18,12 +18,10 @@ from annelid.analysis.paper import (
     agreement,
     changed_fields,
     formulation,
-    has_rigid_crossings,
     references,
     stands_for_the_papers,
 )
 from annelid.analysis.summary import NUMBERS, Summary
-from annelid.body.worm import WormBody
 from annelid.config import toml_value
 from annelid.errors import listed, shortened
 
@@ -119,11 +117,11 @@ def _rows(numbers: Summary, config: RunConfig) -> dict[str, Row]:
     """Rows by the name of their number; those without any number are left out."""
     beside = references(config)
     # A planar worm has one sensor per segment, and no name for it.
-    sensor = config.body.springs.first_sensor if isinstance(config.body, WormBody) else None
+    sensor = config.body.first_sensor
     cells = {"order": ("segment at onset (s)", _onsets(numbers)), "wave": ("wave 1-2-..-N", _wave(numbers))}
     # What is no section's own, such as the speed of computing, comes last.
     for name, number in sorted(NUMBERS.items(), key=lambda one: one[1].section is Summary):
-        if number.label and name not in _NO_ROW and (sensor is not None or ", mean" not in number.label):
+        if number.label and name not in _NO_ROW and (sensor or ", mean" not in number.label):
             label = number.label.replace("first helix", sensor) if sensor else number.label.replace(", first helix", "")
             cells[name] = (label, _ours(name, numbers))
         if name == "energy_muscle_work_J":
@@ -219,18 +217,18 @@ def legend(numbers: Summary, config: RunConfig) -> str:
     said = [f"pp: peak to peak. [P]: published, {paper}, {places}."]
     if stands_for_the_papers(config):
         said.append(f"Other references: {FORMULATION}, the paper's own formulation.")
-        said += [_about_rigid_crossings(numbers)] if has_rigid_crossings(config) else []
+        said += [_about_rigid_crossings(numbers)] if config.body.has_rigid_crossings else []
     return " ".join(said)
 
 
 def closing_sentence(numbers: Summary, config: RunConfig) -> str:
     """Says what is changed of a preset, or whether a run reproduces the paper's own formulation; else nothing."""
-    if not references(config) or not isinstance(config.body, WormBody):
+    if not references(config):
         return ""
     preset, changed = changed_fields(config)
     if changed:
         return f"this run differs from {preset} in {listed(changed)}: the references are those of the unchanged worm"
-    if not stands_for_the_papers(config) or has_rigid_crossings(config) or numbers.status != "complete":
+    if not stands_for_the_papers(config) or config.body.has_rigid_crossings or numbers.status != "complete":
         return ""
     found = agreement(numbers)
     within = f"{100 * ELONGATION_WITHIN:g} %"

@@ -8,8 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from annelid.body import mesh_of
-from annelid.body.worm import WormBody
+from annelid.body import worm_of
 from annelid.config import LEVELS, Clock, RunConfig, load_config
 from annelid.errors import ConfigError, require_at_least, require_positive, suggest
 from annelid.morphology import Array
@@ -88,8 +87,7 @@ def task_of(
     checked = Weights(**{name: float(value) for name, value in (weights or {}).items()})
     # The middle of a worm has passed a pipe behind all that bends or narrows, else a body length on.
     reach_m = config.arena.reach_m() if config.arena is not None else None
-    assert isinstance(config.body, WormBody)
-    goal_m = None if reach_m is None else reach_m[1] or mesh_of(config.body.mesh).length_m
+    goal_m = None if reach_m is None else reach_m[1] or worm_of(config).geometry().length_m
     return Task(config, moves, steps, checked, float(start_activation), goal_m)
 
 
@@ -130,8 +128,7 @@ def _worm(preset: str, changes: Mapping[str, Any], arena: str | None, fidelity: 
         fidelity=COARSE_BASE if coarse else fidelity,
         arena=arena,
     )
-    if not isinstance(config.body, WormBody):
-        raise ConfigError(f"body.kind = {config.body.kind!r} has no environment; only the 3D worm ('worm') has")
+    worm_of(config)
     return config
 
 

@@ -9,7 +9,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from annelid.body.worm import WormBody
 from annelid.config import RunConfig, load_config, toml_value
 from annelid.output import write_text
 from annelid.textfiles import nested, toml_text
@@ -20,7 +19,6 @@ SHEAR_OVER_YOUNG = 1.0 / 1.5
 # Samples and postures of a study's runs: enough for its numbers and for a picture at 1.5 s, a tenth of the disk.
 _SPARSE = {"record.signals_interval_s": 0.01, "record.frames_interval_s": 0.5}
 # Milliseconds of one core for each evaluation of the dynamics, only to start the longest runs first.
-_PLANAR_STEP_MS = 0.05
 
 
 @dataclass(frozen=True)
@@ -62,12 +60,8 @@ class Case:
     @property
     def cost_s(self) -> float:
         """About how long the run takes on one core, s: for the order of the runs and the progress bar."""
-        body, clock = self.config.body, self.config.clock
-        evaluations = self.config.duration_s / clock.physics_timestep_s
-        if not isinstance(body, WormBody):
-            return evaluations * _PLANAR_STEP_MS / 1e3
-        size = body.mesh.n_segments / 3 * body.mesh.elements_per_side / 3
-        return evaluations * size * body.formulation.step_cost_ms / 1e3
+        steps = self.config.duration_s / self.config.clock.physics_timestep_s
+        return steps * self.config.body.step_cost_ms / 1e3
 
     def but(self, changes: Mapping[str, Any]) -> Case:
         """Returns the case with further changes."""

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from annelid.analysis import NUMBERS
-from annelid.body.worm import WormBody
 from annelid.config import RunConfig
 from annelid.errors import ConfigError, listed
 from annelid.experiment.case import Case
@@ -32,7 +31,7 @@ RUNS = "check"
 """Subfolder of the finer runs, and the name of the file of results."""
 RESOLVED = 0.1
 """Share of a number by which it may move; of a number that is a share, the change itself."""
-STEP, ELEMENTS, MOST_ELEMENTS = "clock.physics_timestep_s", "body.mesh.elements_per_side", 32
+STEP = "clock.physics_timestep_s"
 HALF, MORE = "half_step", "more_elements"
 """The two refinements."""
 CHECKED = (
@@ -138,7 +137,7 @@ class Check:
         faults = self.unresolved
         by_step = not faults or any(self.moved[name].get(HALF, 0.0) > RESOLVED for name in faults)
         finer = halves[0] if by_step and halves else self.refinements[-1]
-        path = STEP if finer.name == HALF else ELEMENTS
+        path = STEP if finer.name == HALF else next(iter(finer.changes))
         return f"Try --set {path}={finer.changes[path]:g}, and check again."
 
     def to_dict(self) -> dict[str, Any]:
@@ -182,14 +181,15 @@ def refinements(config: RunConfig) -> tuple[tuple[Refinement, ...], tuple[str, .
         )
     half = finer_steps(config)[0]
     found = [Refinement(HALF, f"half the step ({1e3 * half[STEP]:g} ms)", half)]
-    if not isinstance(config.body, WormBody):
+    elements = config.body.elements
+    if elements is None:
         return tuple(found), (f"A body of kind {config.body.kind!r} has no elements: only its step is halved.",)
-    if config.body.formulation.is_papers:
+    if config.body.is_papers:
         return tuple(found), ("A chain keeps the paper's elements: only its step is halved.",)
-    if counts := more_elements(config):
-        found.append(Refinement(MORE, f"one more element a side ({counts[0]})", {ELEMENTS: counts[0]}))
+    if more := more_elements(config):
+        found.append(Refinement(MORE, f"one more element a side ({elements.number + 1})", more[0]))
         return tuple(found), ()
-    return tuple(found), (f"The mesh has {MOST_ELEMENTS} elements a side, the most that are allowed.",)
+    return tuple(found), (f"The mesh has {elements.most} elements a side, the most that are allowed.",)
 
 
 def compare(run: Outcome, finer: Mapping[Refinement, Outcome | str], left_out: Sequence[str] = ()) -> Check:
@@ -335,8 +335,10 @@ def finer_steps(config: RunConfig) -> list[dict[str, float]]:
     return [finer(2), *([finer(4)] if ratio > 1 and ratio % 4 == 0 else [])]
 
 
-def more_elements(config: RunConfig) -> list[int]:
-    """Returns one and two elements a side more than a worm has, as far as that is allowed."""
-    assert isinstance(config.body, WormBody)
-    count = config.body.mesh.elements_per_side
-    return [finer for finer in (count + 1, count + 2) if finer <= MOST_ELEMENTS]
+def more_elements(config: RunConfig) -> list[dict[str, int]]:
+    """Returns what gives a body one and two elements more than it has, as far as that is allowed."""
+    elements = config.body.elements
+    if elements is None:
+        return []
+    counts = range(elements.number + 1, min(elements.number + 2, elements.most) + 1)
+    return [{elements.field: count} for count in counts]

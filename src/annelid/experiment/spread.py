@@ -19,7 +19,6 @@ import numpy as np
 from pydantic import BaseModel
 
 from annelid.body.actuators.servo import wrap_factors
-from annelid.body.worm import WormBody
 from annelid.config import RunConfig
 from annelid.errors import ConfigError, UnreadableText, suggest
 from annelid.experiment.space import unit_samples
@@ -152,7 +151,7 @@ def read_spread(path: Path | None = None) -> Spread:
 
 def applicable(config: RunConfig, spread: Spread) -> tuple[Spread, dict[str, str]]:
     """Returns the spread of those parameters that change a 3D worm, and the reason of every other one by its name."""
-    if not isinstance(config.body, WormBody):
+    if config.body.elements is None:
         raise ConfigError(
             f"body.kind = {config.body.kind!r} has no calibrated parameters and no elements, so no error bars; they "
             "are for the 3D worm (body.kind = 'worm')"

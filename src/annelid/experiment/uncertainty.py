@@ -19,13 +19,12 @@ from typing import Any, Literal
 from rich.table import Table
 
 from annelid.analysis import Summary
-from annelid.body.worm import WormBody
 from annelid.config import RunConfig, unit_of
 from annelid.draw.figures.experiments import Panel, uncertainty_figure
 from annelid.draw.table import framed_table
 from annelid.errors import ConfigError, SimulationStopped
 from annelid.experiment.case import Case
-from annelid.experiment.check import ELEMENTS, STEP, finer_steps, go_on_in, more_elements
+from annelid.experiment.check import STEP, finer_steps, go_on_in, more_elements
 from annelid.experiment.executors import workers
 from annelid.experiment.progress import StudyProgress
 from annelid.experiment.spread import UNMEASURED, Spread, applicable, changes, draw, read_spread, scaled_fields
@@ -284,7 +283,7 @@ def plan(config: RunConfig, n: int, spread: Spread) -> list[tuple[Kind, dict[str
         ("nominal", {}),
         *(("drawn", changes(config, spread, row)) for row in draw(n, spread, config.seed)),
         *(("time step", finer) for finer in finer_steps(config)),
-        *(("elements", {ELEMENTS: count}) for count in more_elements(config)),
+        *(("elements", finer) for finer in more_elements(config)),
     ]
 
 
@@ -364,11 +363,12 @@ def _remarks(result: Uncertainty) -> list[str]:
         remedy = f"; --vary {names[0]}=0.1 takes one of 10 %" if reason == UNMEASURED else ""
         lines.append(f"not varied: {', '.join(names)} ({reason}{remedy})")
     steps = _listed([1e3 * run.changes[STEP] for run in result.of("time step")])
-    counts = _listed([run.changes[ELEMENTS] for run in result.of("elements")])
-    assert isinstance(config.body, WormBody)
+    elements = config.body.elements
+    assert elements is not None
+    counts = _listed([run.changes[elements.field] for run in result.of("elements")])
     lines.append(
         f"time step: {1e3 * config.clock.physics_timestep_s:g} ms against {steps} ms; "
-        f"elements a side: {config.body.mesh.elements_per_side} against {counts}"
+        f"elements a side: {elements.number} against {counts}"
     )
     for run in result.runs:
         changed = {path.rpartition(".")[2]: value for path, value in run.changes.items()}

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.body.worm import WormBody
+from annelid.body.worm import worm_of
 from annelid.config import Knob, RunConfig, load_config
 from annelid.draw.scene import postures_of
 from annelid.morphology import Array
@@ -201,8 +201,7 @@ def reel_of(run: Run, n_coordinates: int) -> Reel:
 
 def knobs_of(config: RunConfig) -> tuple[Knob, ...]:
     """Returns what can be turned of a 3D worm; sensors and drive only where its controller uses them."""
-    body, arena, controller, sensor = config.body, config.arena, config.controller, config.sensor
-    assert isinstance(body, WormBody)
+    body, arena, controller, sensor = worm_of(config), config.arena, config.controller, config.sensor
     assert arena is not None
     friction, strands, springs = "arena.friction", "body.strands.young_modulus_Pa", "body.springs.stiffness_N_per_m"
     sliding = f"Sliding friction of skin and ground ({'forwards' if arena.has_setae else 'any direction'}). "

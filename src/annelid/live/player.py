@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-from annelid.body.worm import WormBody
 from annelid.config import RunConfig
 from annelid.errors import ConfigError, SimulationStopped
 from annelid.live.living import LivingWorm, Moment, Reel, reel_of
@@ -108,7 +107,7 @@ class Player:
 def config_of(source: RunConfig | Run) -> RunConfig:
     """Returns the configuration that a worm is run under, or was; refuses a planar worm."""
     config = source.config if isinstance(source, Run) else source
-    if not isinstance(config.body, WormBody):
+    if config.body.geometry() is None:
         raise ConfigError(
             f"body.kind = {config.body.kind!r} has nothing to view in 3D; only the 3D worm (body.kind = 'worm') has: "
             "use annelid run and annelid draw"

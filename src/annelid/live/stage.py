@@ -16,9 +16,7 @@ from annelid.arena.geoms import (
     RAIL_HALF_HEIGHT_M,
     RAIL_RGBA,
 )
-from annelid.arena.kinds.floor import Floor
 from annelid.arena.surface import Shape
-from annelid.body.worm import WormBody
 from annelid.config import RunConfig
 from annelid.config.run import ArenaKind
 from annelid.draw.camera import FIELD_OF_VIEW_DEG, fitting_distance, picture_axes, view_angles
@@ -92,14 +90,13 @@ class Stage:
             head_radius=0.009,
             head_length=0.022,
         )
-        assert isinstance(config.body, WormBody)
-        heading = config.body.heading_deg
+        heading = config.body.first_heading_deg
         assert config.arena is not None
         _add_ground(scene, config.arena, float(np.ptp(first.strands[..., 0])), heading)
         self._things = Things(scene, f"{_ROOT}/ground", painter.model, Shape(*_squares(0.0)), _FLOOR_LOOK)
         self._things.place(*painter.places(self._things.geoms))
         self._first_middle = first.middle
-        self._level = type(config.arena) is Floor and config.arena.slope_deg == 0.0
+        self._level = config.arena.is_plane and config.arena.slope_rad == 0.0
         points = first.strands.reshape(-1, 3) @ self.turn.T
         target = (points.min(axis=0) + points.max(axis=0)) / 2
         angles = view_angles("isometric", heading)

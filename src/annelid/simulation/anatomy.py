@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from annelid.arena.geoms import touching
 from annelid.arena.ground import surface_of
 from annelid.arena.surface import Surface
-from annelid.body import mesh_of
 from annelid.body.actuation import crossing_site, ring_names, stretch_sensors
 from annelid.body.formulations.rods.strains import RodVertices
 from annelid.body.rows import Ties
@@ -97,7 +96,7 @@ class Anatomy:
     def __init__(self, model: mujoco.MjModel, body: WormBody, arena: ArenaKind) -> None:
         """Finds the parts of a body compiled with `add_contact_sensors`, in an arena."""
         self.model = model
-        self.geometry: MeshGeometry = mesh_of(body.mesh)
+        self.geometry: MeshGeometry = body.geometry()
         self.rings = body.rings
         self.muscle_names = ring_names(body.n_segments, body.rings)
         self.n_segments = self.geometry.n_segments

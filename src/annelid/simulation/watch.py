@@ -17,7 +17,6 @@ from annelid.body.estimates import COLLAPSED, HARDLY, touching_ring_m
 from annelid.body.worm import WormBody
 from annelid.config import Guard
 from annelid.morphology import Array, MeshGeometry
-from annelid.plausibility import IDLE_SHARE, NUMERICAL_SHARE
 from annelid.protocols import State
 
 ACTIVATED = 0.1
@@ -34,6 +33,10 @@ WIDE_GAP = 0.5
 """Gap between the two strands of a crossing, over the side of a rhombus, from which a run is doubtful."""
 LEAST_WORK_J = 0.01
 """Work of the muscles below which the integrator's share of it means nothing."""
+NUMERICAL_SHARE = 1 / 3
+"""Share of the muscles' work lost to the integrator above which a run is doubtful."""
+IDLE_SHARE = 1e-3
+"""Share of its greatest force that an actuator must reach in a contraction."""
 
 
 class Energies(NamedTuple):

@@ -15,9 +15,10 @@ from annelid.arena.surface import Plane
 from annelid.body import build_spec, compile_spec
 from annelid.body.formulations.rods.strains import RodStrains, net_stiffness
 from annelid.body.rows import tendons_to_rows
-from annelid.body.worm import WormBody
+from annelid.body.worm import WormBody, worm_of
 from annelid.clock import SLACK_S, StepRatio
 from annelid.config import ArenaKind, RunConfig
+from annelid.config.run import Walls
 from annelid.errors import SimulationStopped
 from annelid.morphology import Array, heading_turn
 from annelid.plausibility import check, refuse_nonsense
@@ -92,9 +93,9 @@ _FRAME_SIGNALS = {
 
 def body_and_arena(config: RunConfig) -> tuple[WormBody, ArenaKind]:
     """Returns body and arena of a configuration that is of a 3D worm."""
-    assert isinstance(config.body, WormBody)
+    body = worm_of(config)
     assert config.arena is not None
-    return config.body, config.arena
+    return body, config.arena
 
 
 def compile_worm(config: RunConfig) -> Anatomy:
@@ -145,6 +146,7 @@ class WormPlant:
         body, arena = body_and_arena(config)
         self._body = body
         self._surface = surface_of(arena)
+        self._has_cheap_surface = arena.is_plane and arena.walls == Walls()
         self._is_scene = arena.is_scene
         self._height_words = (
             "distance of a crossing from the pipe's wall" if arena.is_closed else "height of a crossing"
@@ -350,7 +352,7 @@ class WormPlant:
         due = self._control_step % (ALARM_EVERY * self._ratio.control_steps_per_move) == 0
         if due:
             energy = self.kinetic_energy_J()
-        if due or isinstance(self._surface, Plane):
+        if due or self._has_cheap_surface:
             with np.errstate(invalid="ignore", over="ignore"):
                 distance, _ = self._surface.nearest(posture.crossing, first_order=True)
                 height = float(np.abs(distance).max())

@@ -22,7 +22,7 @@ import numpy as np
 from rich.table import Table
 
 from annelid.arena import Floor
-from annelid.body import WormBody, build_spec, compile_spec, crossing_site, mesh_of, ring_names, wrap_factors
+from annelid.body import WormBody, build_spec, compile_spec, crossing_site, ring_names, worm_of, wrap_factors
 from annelid.config import RunConfig
 from annelid.draw import load_frame_figure
 from annelid.errors import AnnelidError, ConfigError, SimulationStopped
@@ -166,12 +166,10 @@ def load_frame(
         two half-rings, whose cables are wound alike).
 
     Raises:
-        ConfigError: The body is planar, or displacement, speed or haste is out of range.
+        ConfigError: The body is no 3D worm, or displacement, speed or haste is out of range.
         SimulationStopped: The ring buckled, or the engine gave up.
     """
-    body = config.body
-    if not isinstance(body, WormBody):
-        raise ConfigError(f"body.kind = {body.kind!r} has no ring cable; only the 3D worm (body.kind = 'worm') has")
+    body = worm_of(config)
     if not (0.0 < speed_m_per_s < np.inf and 1.0 <= haste < np.inf):
         raise ConfigError(f"speed = {speed_m_per_s:g} m/s must be greater than 0, and haste = {haste:g} at least 1")
     model, tendons, corners = _compiled(_sped_up(config, body, haste), body)
@@ -242,7 +240,7 @@ def _compiled(config: RunConfig, body: WormBody) -> tuple[mujoco.MjModel, np.nda
         tendon = spec.tendon(name)
         tendon.stiffness, tendon.springlength = [1e-9, 0.0, 0.0], [0.0, 10.0]
     model = compile_spec(spec)
-    ring = mesh_of(body.mesh).rings[middle].tolist()
+    ring = body.geometry().rings[middle].tolist()
     corners = np.array([model.site(crossing_site(crossing)).id for crossing in ring])
     return model, np.array([model.tendon(name).id for name in names]), corners
 

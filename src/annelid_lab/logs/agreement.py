@@ -12,7 +12,7 @@ from scipy.optimize import minimize_scalar
 from scipy.signal import correlate, find_peaks
 
 from annelid.analysis import forward_position, track_of
-from annelid.body import WormBody, mesh_of, stretch_sensors
+from annelid.body import stretch_sensors, worm_of
 from annelid.errors import ConfigError, listed, shown, suggest
 from annelid.protocols import Array
 from annelid.simulation import Run
@@ -223,7 +223,7 @@ def run_series(run: Run, reference: str) -> tuple[Array, Array, str]:
     if name == "travel" and "center_of_mass" in run.data and not given:
         ahead = forward_position(run)
         return run.data["time"].values, ahead - ahead[0], "m"
-    if name == "ring_distance" and isinstance(run.config.body, WormBody):
+    if name == "ring_distance" and run.config.body.geometry() is not None:
         between = [str(segment) for segment in range(1, run.config.body.n_segments)]
         first = int(_label(given[0] if given else "", between, reference, "pair of rings"))
         track = track_of(run)
@@ -261,10 +261,10 @@ def _label(given: str, known: list[str], reference: str, what: str) -> str:
 
 def _sides(run: Run) -> dict[str, list[int]]:
     """Which sensor of each segment lies to the left, and which to the right."""
-    body = run.config.body
-    if not isinstance(body, WormBody):
+    geometry = run.config.body.geometry()
+    if geometry is None:
         return {}
-    geometry = mesh_of(body.mesh)
+    body = worm_of(run.config)
     carried = stretch_sensors(geometry, body.springs)
     sides = stretch_sensors(geometry, body.springs.model_copy(update={"sensors": "sides"}))
     places = (carried[:, :, None] == sides[:, None, :]).argmax(axis=1)

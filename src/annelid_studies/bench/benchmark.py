@@ -69,7 +69,7 @@ Share = Callable[[float], object]
 # Importing, compiling, and the pass with the engine's timers.
 _OVERHEAD_S = 5.0
 # Exponents by which the cost of a step grows with the number of segments, beyond proportion.
-_GROWTH = {"chain": 2.0, "rods": 0.4}
+_CHAIN_GROWTH, _ROD_GROWTH = 2.0, 0.4
 
 
 @locks("folder")
@@ -139,7 +139,7 @@ def judge(cases: Sequence[BenchCase], measured: Mapping[str, Mapping[str, Any]])
 
 
 def _cost_s(case: BenchCase) -> float:
-    growth = _GROWTH[case.body.formulation.kind]
+    growth = _CHAIN_GROWTH if case.body.is_papers else _ROD_GROWTH
     n_runs = 1 + len(case.perturbed)
     return n_runs * case.case.cost_s * (case.body.n_segments / 3) ** growth + _OVERHEAD_S
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from math import ceil
 from typing import Any, Literal
 
-from annelid.body import WormBody
+from annelid.body import WormBody, worm_of
 from annelid.config import LEVELS, RunConfig, load_config
 from annelid.errors import ConfigError, suggest
 from annelid.experiment import Case
@@ -53,7 +53,7 @@ class BenchCase:
     @property
     def body(self) -> WormBody:
         """The 3D worm's body."""
-        return _worm_body(self.case.config)
+        return worm_of(self.case.config)
 
     @property
     def perturbed(self) -> list[RunConfig]:
@@ -99,7 +99,7 @@ def judged(changes: Mapping[str, Any], line: str, level: str | None = None) -> B
     """Rods of three segments for three cycles, with changes of the mesh, the step or the impedance ratio."""
     step_s = changes.get(_STEP, load_config(RODS).clock.physics_timestep_s)
     case = Case(RODS, {**changes, **_steps_of(step_s)})
-    name = f"rods, {_worm_body(case.config).mesh.elements_per_side} elements, {1e3 * step_s:g} ms"
+    name = f"rods, {worm_of(case.config).mesh.elements_per_side} elements, {1e3 * step_s:g} ms"
     name += f", impedance ratio {changes[_IMPEDANCE_RATIO]:g}" if _IMPEDANCE_RATIO in changes else ""
     return BenchCase(name, "judged", case, (line,), level)
 
@@ -114,7 +114,7 @@ def timed(preset: str, n_segments: int, duration_s: float, line: str) -> BenchCa
     changes: dict[str, Any] = {"body.mesh.n_segments": n_segments, "duration_s": duration_s}
     if preset == CHAIN and n_segments != 3:
         # The paper's file gives one range for each of three segments; the rods' preset has their mean.
-        changes["body.rings.length_range_m"] = _worm_body(load_config(RODS)).rings.length_range_m
+        changes["body.rings.length_range_m"] = worm_of(load_config(RODS)).rings.length_range_m
     case = Case(preset, {**changes, **_recorded_as(preset)})
     return BenchCase(f"{preset}, {n_segments} segments, {duration_s:g} s", "speed", case, (line,))
 
@@ -132,11 +132,6 @@ def _cases_of(line: str, effort: Effort) -> list[BenchCase]:
             return [timed(CHAIN, n, CHAIN_S, line) for n in _CHAIN_SEGMENTS[effort]]
         case _:
             return [timed(RODS, 3, duration, line) for duration in _DURATIONS_S[effort]]
-
-
-def _worm_body(config: RunConfig) -> WormBody:
-    assert isinstance(config.body, WormBody)
-    return config.body
 
 
 def _steps_of(step_s: float) -> dict[str, float]:

@@ -11,7 +11,7 @@ from annelid.clock import StepRatio
 from annelid.config import Positive
 from annelid.errors import ConfigError
 from annelid.protocols import Array, SavedAndRecorded, Sensation, State, Values
-from annelid_studies.planar.sections import PlanarWorm
+from annelid_studies.planar.sections import PlanarWorm, rhombi
 
 if TYPE_CHECKING:
     from annelid.config import Clock, RunConfig
@@ -22,6 +22,8 @@ class PlanarBody(PlanarWorm):
 
     cites = (("riddle2022", "the planar worm"),)
     touches_ground = False
+    frame_size = (1280, 560)
+    video_size = (960, 432)
     kind: Literal["riddle2022"] = "riddle2022"
     heights = ("height_min_m", "height_max_m")
     height_min_m: Positive = Field(default=0.065, description="height when contracted")
@@ -29,6 +31,10 @@ class PlanarBody(PlanarWorm):
     gain: Positive = Field(
         default=1.3, description="proportional gain k of the actuator; 1.3, 1.9, 3.6 for 300, 200, 100 ms"
     )
+
+    def outlines(self, values: Values) -> Array:
+        """Returns rhombi about the middle, as `BodyKind.outlines`: the worm has nothing to push against."""
+        return rhombi(np.asarray(values["stretch_length"])[..., 0], np.asarray(values["ring_length"]))
 
     def build(self, config: RunConfig) -> Riddle2022Plant:
         """Builds the worm, as `BodyKind.build`."""

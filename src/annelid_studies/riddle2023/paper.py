@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from annelid.analysis import PAPER_ELONGATION_M, PAPER_END_DIFFERENCE, PAPER_MIDDLE_DEFICIT, middle_deficit
-from annelid.body import WormBody
+from annelid.body import worm_of
 from annelid.draw import figure7, network_figure
 from annelid.errors import ConfigError, suggest
 from annelid.experiment import Case, Outcome, Store, StudyProgress, code_fingerprint
@@ -163,8 +163,8 @@ Series = Mapping[str, Sequence[float]]
 
 
 def _figure_5(run: Run, series: Series, stem: Path) -> str:
-    assert isinstance(run.config.body, WormBody)
-    return muscle_surface.figure_5_muscle_surface(run.config.body.muscles, stem, run.config.body.n_segments)
+    body = worm_of(run.config)
+    return muscle_surface.figure_5_muscle_surface(body.muscles, stem, body.n_segments)
 
 
 def _figure_6(run: Run, series: Series, stem: Path) -> str:

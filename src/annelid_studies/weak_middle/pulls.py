@@ -9,7 +9,7 @@ from math import inf, isfinite, nan
 from typing import Any, NamedTuple
 
 from annelid.analysis import ROBOT_ELONGATION_M
-from annelid.body import Rings, WormBody, mesh_of, muscle_force
+from annelid.body import Rings, WormBody, muscle_force, worm_of
 from annelid.config import load_config
 from annelid.errors import ConfigError
 from annelid.experiment import Case, Hold, Outcome, Store
@@ -71,23 +71,19 @@ class Actuator(NamedTuple):
 @cache
 def base_body() -> WormBody:
     """Returns the body of the base worm: four segments of the preset."""
-    body = load_config(PRESET, BASE_WORM).body
-    assert isinstance(body, WormBody)
-    return body
+    return worm_of(load_config(PRESET, BASE_WORM))
 
 
 @cache
 def papers_muscle() -> Rings:
     """Returns the paper's muscle in the base worm's layout."""
-    body = load_config(RODS).body
-    assert isinstance(body, WormBody)
-    return body.muscles.model_copy(update={"layout": base_body().rings.layout})
+    return worm_of(load_config(RODS)).muscles.model_copy(update={"layout": base_body().rings.layout})
 
 
 @cache
 def rest_ring_m() -> float:
     """Length of a ring of the base worm at rest, m."""
-    return round(float(mesh_of(base_body().mesh).ring_length_m[0]), 6)
+    return round(float(base_body().geometry().ring_length_m[0]), 6)
 
 
 # The cable's own damping delays the standstill and changes nothing of it.

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from annelid.analysis import ROBOT_ELONGATION_M, interior_deficit
-from annelid.body import mesh_of
 from annelid.errors import ConfigError
 from annelid.experiment import Case, Store
 from annelid.morphology import Array
@@ -63,7 +62,7 @@ def weight_changes(mass_kg: float) -> dict[str, Any]:
     if mass_kg == 0:
         return {"arena.gravity_m_per_s2": 0.0}
     body = base_body()
-    mesh = mesh_of(body.mesh)
+    mesh = body.geometry()
     strands_kg = mesh.n_strands * mesh.strand_length_m * body.strands.one_number("linear_density_kg_per_m")
     if mass_kg <= strands_kg:
         raise ConfigError(f"mass_kg = {mass_kg:g} must be above {strands_kg:.3f}, which the strands weigh alone")

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from annelid import Run, load_config, simulate, summary
-from annelid.draw.planar_scene import PlanarScene, bent_rhombi, rhombi
+from annelid.draw.planar_scene import PlanarScene
+from annelid_studies.planar import bent_rhombi, rhombi
 
 PRESETS = ("daltorio2013", "boxerbaum2012")
 
@@ -64,3 +65,14 @@ def test_an_outline_of_rhombi_closes_to_rhombi(run: Run) -> None:
     assert found - found[0, 0] == pytest.approx(expected - expected[0, 0], abs=1e-12)
     for left, right in pairwise(found):
         assert left[2] == pytest.approx(right[0])
+
+
+def test_rhombi_touch_tip_to_tip_and_keep_their_sides() -> None:
+    side = 0.073
+    heights = np.array([0.065, 0.11, 0.09])
+    lengths = np.sqrt((2 * side) ** 2 - heights**2)
+    corners = rhombi(lengths, heights)
+    np.testing.assert_allclose(corners[:-1, 2], corners[1:, 0], atol=1e-15)
+    sides = np.linalg.norm(np.diff(np.concatenate([corners, corners[:, :1]], axis=1), axis=1), axis=2)
+    np.testing.assert_allclose(sides, side)
+    assert corners[0, 0, 0] == pytest.approx(-corners[-1, 2, 0]), "the middle of the worm is at the origin"

@@ -81,7 +81,7 @@ class Floor(Ground):
 
 def refuse_heading(config: RunConfig, where: str) -> None:
     """Raises ValueError for a worm that does not lead towards -x where an arena, by this field, lies along x."""
-    heading_deg = getattr(config.body, "heading_deg", 0.0)
+    heading_deg = config.body.first_heading_deg
     if heading_deg:
         raise ValueError(
             f"body.heading_deg = {heading_deg:g}: must be 0 with {where}, which lies along x; take a floor without "

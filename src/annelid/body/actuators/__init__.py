@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
 import numpy as np
 from pydantic import Field, field_validator
 
-from annelid.body.estimates import Finding
 from annelid.body.mesh import MeshBody
 from annelid.config.kinds import Kind
+from annelid.config.run import Finding
 from annelid.config.sections import PerSegmentOf, Positive, Range
 from annelid.morphology import Array
 from annelid.registry import Registry

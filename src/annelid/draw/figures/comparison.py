@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from annelid.analysis.track import forward_position
-from annelid.body.worm import WormBody
 from annelid.draw.canvas import canvas, line_entries, line_looks, panel_title, save
 from annelid.draw.plots import neuron_potentials
 from annelid.errors import RunFileError
@@ -74,7 +73,7 @@ def travel_figure(runs: Sequence[Run], labels: Sequence[str], path: Path) -> Pat
     drawn = [track is not None for track in tracks]
     if not any(drawn):
         raise RunFileError("none of these runs recorded where the worm went")
-    seen = [isinstance(run.config.body, WormBody) for run in runs]
+    seen = [not run.config.body.is_planar for run in runs]
     with canvas(3.4) as figure:
         panels = figure.subplots(1, 2 if any(seen) else 1, squeeze=False)[0]
         panel_title(panels[0], "Travel towards the front (cm)")

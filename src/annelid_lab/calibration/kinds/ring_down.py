@@ -14,7 +14,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from annelid.body import WormBody
+from annelid.body import worm_of
 from annelid.config import Length, Line, NonNegative, RunConfig
 from annelid.errors import ConfigError
 from annelid.protocols import Array
@@ -51,8 +51,8 @@ class RingDown(Experiment):
 
     def mode(self, config: RunConfig) -> tuple[float, float]:
         """Undamped angular frequency of a worm's strand, rad/s, and the rate at which its amplitude decays, 1/s."""
-        strands = config.body.strands if isinstance(config.body, WormBody) else None
-        if strands is None or not strands.damping_time_s:
+        strands = worm_of(config).strands
+        if not strands.damping_time_s:
             raise ConfigError(
                 f"experiments.{self.name}: a ring-down needs strands with a damping of the material: set "
                 "body.strands.damping_time_s"

@@ -14,7 +14,7 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from annelid.body import WormBody
+from annelid.body import worm_of
 from annelid.config import Length, Line, Positive, RunConfig
 from annelid.errors import ConfigError
 from annelid.protocols import Array
@@ -69,9 +69,7 @@ class Tensile(Experiment):
 
     def tension(self, config: RunConfig, strain: Array) -> Array:
         """Returns the force of a worm's tube at strains, ``(n,)``, N."""
-        body = config.body
-        if not isinstance(body, WormBody):
-            raise ConfigError(f"body.kind = {body.kind!r} has no strands: an experiment of kind 'tensile' needs 'worm'")
+        body = worm_of(config)
         outer, inner = self.outer_diameter_m / 2, self.inner_diameter_m / 2
         # The tube bends like the strand, whatever section the strand's radius stands for.
         linear = body.strands.bending_rigidity_Nm2 / (pi / 4 * (outer**4 - inner**4))

@@ -8,7 +8,7 @@ from math import isnan, nan, pi, sqrt
 import numpy as np
 
 from annelid.analysis import CONTRACTED
-from annelid.body import WormBody, mesh_of
+from annelid.body import worm_of
 from annelid.config import field_value
 from annelid.simulation import Run
 from annelid_studies.riddle2023.claims.evidence import (
@@ -38,9 +38,8 @@ PIN_RADIUS_M = 0.005
 
 def structure_claims(evidence: Evidence) -> list[Claim]:
     """Judges the claims about mesh, strands, pins and springs."""
-    body = MAIN.config.body
-    assert isinstance(body, WormBody)
-    geometry = mesh_of(body.mesh)
+    body = worm_of(MAIN.config)
+    geometry = body.geometry()
     equal_area = sqrt(TUBE_AREA_M2 / pi)
     density = TUBE_AREA_M2 * POLYETHYLENE_KG_PER_M3
     planar = evidence.store.run(PLANAR_CASES[300])
@@ -168,8 +167,7 @@ _of_actuation = partial(Claim, "Actuation")
 
 def actuation_claims(evidence: Evidence) -> list[Claim]:
     """Judges the claims about the muscles."""
-    body = MAIN.config.body
-    assert isinstance(body, WormBody)
+    body = worm_of(MAIN.config)
     difference = largest_difference(body.muscles)
     summaries = [one.summary for one, _ in evidence.runs]
     medians = [summary.contraction_force_median_N or nan for summary in summaries]

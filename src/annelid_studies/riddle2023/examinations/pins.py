@@ -9,10 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from annelid.body import Rods, WormBody, build_spec
+from annelid.body import build_spec, worm_of
 from annelid.config import field_value
 from annelid.draw import canvas, save_both
-from annelid.errors import ConfigError
 from annelid.experiment import Case, Store
 from annelid_studies.riddle2023 import words
 from annelid_studies.riddle2023.contents import Examination, Findings
@@ -43,11 +42,11 @@ def tie_stiffness_N_per_m(case: Case) -> float:
     violation, where ``k = 1 / (d T)^2`` and ``R = (1 - d) / d`` times the inverse mass of the pair.
     """
     config = case.config
-    if not isinstance(config.body, WormBody):
-        raise ConfigError("a planar worm has no pins")
-    formulation = config.body.formulation
-    if isinstance(formulation, Rods):
-        return formulation.pin_stiffness_N_per_m if formulation.pins == "separate" else float("inf")
+    formulation = worm_of(config).formulation
+    if formulation.has_rigid_crossings:
+        return float("inf")
+    if formulation.tie is not None:
+        return formulation.tie.stiffness_N_per_m
     model = build_spec(config).compile()
     inverse_mass = model.body_invweight0[model.eq_obj1id, 0] + model.body_invweight0[model.eq_obj2id, 0]
     (_, impedance, _), time_s = (

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from annelid.analysis import PAPER_MIDDLE_DEFICIT, middle_deficit
-from annelid.body import WormBody
+from annelid.body import worm_of
 from annelid.draw import canvas, save_both
 from annelid.experiment import Store
 from annelid.morphology import Array
@@ -25,8 +25,7 @@ EQUAL = (0.566, 1.067)
 
 def compiled_ranges() -> list[list[float]]:
     """The ranges of the paper's worm, one a segment, as the engine of its time compiled them, m."""
-    body = chain().config.body
-    assert isinstance(body, WormBody)
+    body = worm_of(chain().config)
     return [list(limits) for limits in body.rings.length_ranges(body.mesh.n_segments)]
 
 

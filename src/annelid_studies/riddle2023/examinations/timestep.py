@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from matplotlib.axes import Axes
 
-from annelid.body import WormBody
+from annelid.body import worm_of
 from annelid.config import RunConfig
 from annelid.draw import canvas, save_both
 from annelid.experiment import Case, Outcome, Store
@@ -67,10 +67,9 @@ def _points(effort: Effort) -> list[Point]:
 
 def velocity_limit(config: RunConfig, segment: int = 0) -> float:
     """Returns the speed at which a ring muscle's force vanishes: vmax L0, with L0 = (r1 - r0) / 0.3, m/s."""
-    if not isinstance(config.body, WormBody):
-        raise ValueError("a planar worm has no ring muscles")
-    rings = config.body.muscles
-    low, high = rings.length_ranges(config.body.n_segments)[segment]
+    body = worm_of(config)
+    rings = body.muscles
+    low, high = rings.length_ranges(body.n_segments)[segment]
     return rings.maximum_velocity * (high - low) / 0.3
 
 

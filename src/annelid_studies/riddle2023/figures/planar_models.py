@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import FancyArrowPatch
 
 from annelid.config import RunConfig, load_config
-from annelid.draw import bent_rhombi, canvas, panel_title, rhombi, save_both, segment_colors
+from annelid.draw import canvas, panel_title, save_both, segment_colors
 from annelid.errors import ConfigError
 from annelid.morphology import Array
 from annelid.protocols import Records
@@ -42,20 +42,12 @@ def contracted_outline(config: RunConfig, contracted: int) -> Array:
     plant = build_plant(config)
     activation = np.zeros(plant.n_muscles)
     activation[contracted] = 1.0
-    sensation = plant.reset(0)
+    plant.reset(0)
     for _ in range(round(_SETTLING_TIME_S / config.clock.control_timestep_s)):
-        sensation = plant.step(activation)
-    signals = plant.read(False) if isinstance(plant, Records) else {}
-    if "outline" not in signals:
-        return rigid_outline(sensation.ring_length_m, sensation.stretch_m[:, 0])
-    upper = np.asarray(signals["outline"], dtype=float)
-    corners = bent_rhombi(upper - [upper[0, 0], 0.0], plant.n_segments)
-    return corners[:, : corners.shape[1] // 2 + 1]
-
-
-def rigid_outline(height_m: Array, length_m: Array) -> Array:
-    """Upper halves of hinged rhombi in a row, from the front joint over the top to the rear one, ``(n, 3, 2)``, m."""
-    return rhombi(length_m, height_m)[:, :3] + [np.sum(length_m) / 2.0, 0.0]
+        plant.step(activation)
+    assert isinstance(plant, Records)
+    corners = config.body.outlines(plant.read(False))
+    return corners[:, : corners.shape[1] // 2 + 1] - [corners[0, 0, 0], 0.0]
 
 
 def zigzag(start: Array, end: Array, amplitude: float, n_teeth: int = 9, lead: float = 0.2) -> Array:

@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike, NDArray
 
 from annelid.analysis import nearest_frame
-from annelid.body import WormBody, mesh_of
+from annelid.body import worm_of
 from annelid.config import RunConfig
 from annelid.draw import (
     CONTRACTED,
@@ -35,7 +35,7 @@ from annelid.draw import (
     render_still,
     save_both,
 )
-from annelid.errors import RenderingUnavailable, RunFileError
+from annelid.errors import RenderingUnavailable
 from annelid.morphology import Array, MeshGeometry
 from annelid.simulation import Run, compile_worm
 
@@ -100,9 +100,7 @@ def recorded_posture(run: Run, time_s: float) -> Posture:
 
 
 def _mesh(config: RunConfig) -> MeshGeometry:
-    if not isinstance(config.body, WormBody):
-        raise RunFileError(f"{config.name} is a planar worm: this figure shows the 3D worm")
-    return mesh_of(config.body.mesh)
+    return worm_of(config).geometry()
 
 
 def rendering_works() -> bool:

@@ -83,7 +83,8 @@ def measure_propagation(run: Run, time_s: float = TIME_S) -> Propagation:
     Of rhombi as near to the contracted ring or as far from it as each other, those that figure 8 shows best are taken.
 
     Raises:
-        RunFileError: The worm is planar, or no posture was recorded at that time.
+        ConfigError: The worm is planar.
+        RunFileError: No posture was recorded at that time.
     """
     posture = recorded_posture(run, time_s)
     geometry, segment = posture.geometry, _contracted(posture)
@@ -110,7 +111,8 @@ def figure_2_propagation(run: Run, stem: Path, time_s: float = TIME_S) -> str:
     """Draws rhombi that deform alone beside the same row of the compliant worm; returns the caption.
 
     Raises:
-        RunFileError: The worm is planar, or no posture was recorded at that time.
+        ConfigError: The worm is planar.
+        RunFileError: No posture was recorded at that time.
     """
     posture = recorded_posture(run, time_s)
     geometry, segment = posture.geometry, _contracted(posture)
@@ -167,7 +169,8 @@ def figure_8_propagation(run: Run, stem: Path, time_s: float = TIME_S) -> str:
     """Shows a near and a far rhombus of the worm, and the deformation of all of them; returns the caption.
 
     Raises:
-        RunFileError: The worm is planar, or no posture was recorded at that time.
+        ConfigError: The worm is planar.
+        RunFileError: No posture was recorded at that time.
     """
     measured = measure_propagation(run, time_s)
     posture = measured.posture

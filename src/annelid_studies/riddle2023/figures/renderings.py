@@ -73,7 +73,7 @@ def rest_posture(config: RunConfig) -> Posture:
     """Returns the worm as its mesh is laid out.
 
     Raises:
-        RunFileError: The worm is planar.
+        ConfigError: The worm is planar.
     """
     geometry = _mesh(config)
     return Posture(config, geometry, float("nan"), geometry.crossings_m, geometry.vertices_m)
@@ -83,7 +83,8 @@ def recorded_posture(run: Run, time_s: float) -> Posture:
     """Returns the posture that a run recorded nearest to a time.
 
     Raises:
-        RunFileError: The worm is planar, or no posture was recorded at that time.
+        ConfigError: The worm is planar.
+        RunFileError: No posture was recorded at that time.
     """
     geometry, frame = _mesh(run.config), nearest_frame(run, time_s)
     recorded_s = float(run.data["frame_time"].values[frame])
@@ -227,7 +228,7 @@ def figure_4_model(config: RunConfig, stem: Path) -> str:
     """Shows the model at rest, in the axial and the isometric view; returns the caption.
 
     Raises:
-        RunFileError: The worm is planar.
+        ConfigError: The worm is planar.
     """
     posture = rest_posture(config)
     with canvas(3.3) as figure:

@@ -116,7 +116,7 @@ NEWER_THAN_0_1 = {
         "pin_damping_Ns_per_m",
     ],
     "arena": ["kind", "backward_friction", "slope_deg", "rail_gap_m", "posts"],
-    "guard": ["depth_m", "stretch", "ring_closure"],
+    "guard": ["depth_m"],
 }
 
 

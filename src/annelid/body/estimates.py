@@ -20,7 +20,7 @@ from math import cos, hypot, tan
 from statistics import fmean
 
 from annelid.body.mesh import MeshBody
-from annelid.config.run import Finding
+from annelid.config.answers import Finding
 from annelid.morphology import Rhombus, rhombus
 
 HARDLY = 0.02

@@ -113,6 +113,9 @@ REPLACED = {
     "arena.friction_cone": "rods always have elliptic cones, and a chain pyramidal ones",
     "body.formulation.solver_iterations": "the solver's limits are constants of the formulation",
     "body.formulation.solver_tolerance": "the solver's limits are constants of the formulation",
+    "guard.pin_gap_m": "the two strands of a crossing may always part by 15 cm",
+    "guard.ring_closure": "a ring may always be as short as its crossings are wide",
+    "guard.stretch": "an axial spring may always be 1.1 times as long as the straight strands beside it",
     "controller.landing": "it saved nothing (sns-pressure)",
 }
 """What replaced fields that older files have, by their dotted paths."""

@@ -10,7 +10,8 @@ from pydantic import Field
 
 from annelid.body.formulations import BDF2_SHARE, FormulationKind, PinReader, Tie
 from annelid.body.mesh import MeshBody
-from annelid.config.run import ArenaKind, Finding, RunConfig
+from annelid.config.answers import Finding
+from annelid.config.run import ArenaKind, RunConfig
 from annelid.config.sections import Positive
 from annelid.errors import ConfigError
 from annelid.morphology import Array, MeshGeometry, norm

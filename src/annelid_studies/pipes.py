@@ -30,13 +30,13 @@ QUICK_RADII_M = (0.3,)
 TURN_S = 0.27
 """Time from one segment to the next in bends: about that of the paper's network on this body on open ground."""
 TIMED = {"controller": {"kind": "timed", "rise_s": TURN_S, "hold_s": TURN_S, "fall_s": TURN_S, "interval_s": TURN_S}}
-LIFT, LET_GO_S = 0.45, 0.35
+LIFT, MOTOR_TIME_CONSTANT_S = 0.45, 0.35
 FIXED, ADAPTIVE = "fixed", "adaptive"
 SLOW_S, FAST_S = 45.0, 30.0
 
 
 def _robust(**changes: Any) -> dict[str, Any]:
-    return {"controller": {"kind": "sns-robust", "let_go_s": LET_GO_S, **changes}}
+    return {"controller": {"kind": "sns-robust", "motor_time_constant_s": MOTOR_TIME_CONSTANT_S, **changes}}
 
 
 BEND_GAITS: Mapping[str, Mapping[str, Any]] = {

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from annelid.config.answers import Elements, Finding, OwnModel
 from annelid.config.checking import (
+    CONSTANT,
     REPLACED,
     check_config,
     check_section,
@@ -40,6 +41,7 @@ from annelid.config.study import Study, Vary, load_study
 from annelid.textfiles import toml_value
 
 __all__ = [
+    "CONSTANT",
     "LEVELS",
     "REPLACED",
     "ArenaKind",

@@ -11,7 +11,7 @@ from annelid.body.worm import WormBody
 from annelid.config import load_config
 from annelid.draw.camera import picture_axes
 from annelid.draw.scene import render_still
-from annelid.errors import RenderingUnavailable, RunFileError
+from annelid.errors import ConfigError, RenderingUnavailable, RunFileError
 from annelid.morphology import MeshGeometry
 from annelid.simulation.runfile import Run
 from annelid_studies.riddle2023.figures import renderings

@@ -166,7 +166,7 @@ class Partner:
         """Returns what came since the last answer, in words."""
         return ", ".join(f"{n} x {what}" for what, n in sorted(self._wrong.items())) or "nothing came"
 
-    def gone(self, error: OSError) -> SimulationStopped:
+    def line_lost(self, error: OSError) -> SimulationStopped:
         """Returns what to raise where the line is gone."""
         reason = error.strerror or str(error) or type(error).__name__
         return SimulationStopped(f"the line to the {self.who} at {self.link.name} is gone: {reason}")
@@ -245,7 +245,7 @@ class WirePartner(Partner):
             self.link.send(frame.encoded())
             answer = self._await(self._comes, began + ANSWER * self.pace.period_s)
         except OSError as error:
-            raise self.gone(error) from None
+            raise self.line_lost(error) from None
         if answer is not None:
             try:
                 values = answer.numbers(self._n_coming)

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from importlib import resources
 from math import inf
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -93,11 +94,10 @@ class Loop:
         """
         values = self.force_N if values is None else values
         half = (at_m[1] - at_m[0]) / 2
-        edges = np.append(at_m - half, at_m[-1] + half)
-        parts = (slice(None, self.turn + 1), slice(self.turn, None))
-        means = np.array(
-            [binned_statistic(self.displacement_m[one], values[one], bins=edges).statistic for one in parts]
-        )
+        edges: Any = np.append(at_m - half, at_m[-1] + half)
+        branches = (slice(None, self.turn + 1), slice(self.turn, None))
+        found = [binned_statistic(self.displacement_m[one], values[one], bins=edges) for one in branches]
+        means = np.array([one.statistic for one in found])
         if len(empty := np.flatnonzero(np.isnan(means).any(axis=0))):
             x = self.displacement_m
             raise AnnelidError(

@@ -29,12 +29,12 @@ _AHEAD_S = 0.0005
 
 
 def percentiles(times_s: array[float]) -> dict[str, float | None]:
-    """Returns the percentiles of times that are reported, s; None where there are no times."""
+    """Returns the percentiles of times that are reported, s, to a microsecond; None where there are no times."""
     shares = {"median": 50.0, "p99": 99.0, "p99_9": 99.9, "max": 100.0}
     if not times_s:
         return dict.fromkeys(shares)
-    found = np.percentile(times_s, [*shares.values()], method="inverted_cdf").tolist()
-    return dict(zip(shares, found, strict=True))
+    found = np.percentile(times_s, [*shares.values()], method="inverted_cdf")
+    return dict(zip(shares, found.round(6).tolist(), strict=True))
 
 
 @dataclass(slots=True)

@@ -40,6 +40,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from annelid.simulation.two_step import TwoStep
 
 from annelid.body import compile_spec
 from annelid.body.formulations import BDF2_SHARE
@@ -54,7 +55,6 @@ from annelid.config import load_config
 from annelid.morphology import Array, helical_mesh
 from annelid.output import write_csv
 from annelid.simulation import simulate
-from annelid.simulation.two_step import TwoStep
 from annelid_studies.bench.measure import keep_to_one_core
 
 Place = tuple[int, int]

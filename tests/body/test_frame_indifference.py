@@ -22,6 +22,7 @@ from annelid.config import load_config
 from annelid.protocols import Array
 from annelid.simulation.anatomy import Placed, turned
 from annelid.simulation.worm import WormPlant
+from rods import rods_of
 
 FREE: dict[str, Any] = {
     "arena.gravity_m_per_s2": 0.0,
@@ -60,8 +61,7 @@ def at_rest(plant: WormPlant) -> Placed:
 
 def lost(plant: WormPlant, placed: Placed, velocity: Array) -> Lost:
     """The rates of the rods' strains in a posture that moves, and what the material takes."""
-    model, data, strains = plant.model, mujoco.MjData(plant.model), plant.strains
-    assert strains is not None
+    model, data, strains = plant.model, mujoco.MjData(plant.model), rods_of(plant).strains
     # Their rows at a posture know it and nothing else.
     strains.follow(placed.qpos)
     strains.renew(placed.qpos)

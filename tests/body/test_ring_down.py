@@ -27,11 +27,11 @@ from annelid.body.formulations.chain.capsules import add_chain
 from annelid.body.formulations.rods import Rods
 from annelid.body.formulations.rods.net import add_rod, add_vertex, lumped_masses
 from annelid.body.formulations.rods.strains import RodStrains, vertex_stiffness
+from annelid.body.formulations.rods.two_step import TwoStep
 from annelid.body.mesh import Strands
 from annelid.body.rows import HELD, tendons_to_rows
 from annelid.morphology import Array
 from annelid.simulation import worm as _engine_warnings_go_to_the_log  # noqa: F401
-from annelid.simulation.two_step import TwoStep
 
 Motion = Literal["in plane", "across", "twist"]
 Formulation = Literal["rods", "chain"]

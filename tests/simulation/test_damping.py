@@ -10,6 +10,7 @@ import pytest
 from annelid.body import build_spec
 from annelid.config import load_config
 from annelid.simulation.worm import WormPlant
+from rods import rods_of
 
 TIME_S = 0.145
 SMALL = {"body.mesh.elements_per_end": 1, "body.mesh.elements_per_side": 1}
@@ -29,9 +30,7 @@ def test_a_row_s_force_is_stiffness_times_strain_and_damping_times_rate(elements
     """At the end of the step, to the order of the step, though the engine scales its rows with step and posture."""
     changes = {"body.mesh.elements_per_side": elements, "clock.physics_timestep_s": step_s}
     plant = pulled(changes, 40 * step_s)
-    strains, two_step = plant.strains, plant.two_step
-    assert strains is not None
-    assert two_step is not None
+    strains, two_step = rods_of(plant).strains, rods_of(plant).two_step
     forces, rates = two_step.rows()
     strain = strains.renew(plant.qpos)
     wanted = -(strains._stiffness * strain).ravel() - strains._damping.ravel() * rates
@@ -47,14 +46,12 @@ def test_what_the_material_takes_is_damping_not_constraints() -> None:
 
 def test_rows_follow_the_posture_alone() -> None:
     plant = pulled({}, 0.2)
-    assert plant.strains is not None
     coefficients = plant.model.wrap_prm.copy()
-    plant.strains.renew(plant.qpos)
+    rods_of(plant).strains.renew(plant.qpos)
     assert np.abs(plant.model.wrap_prm - coefficients).max() > 0
     elsewhere = pulled({}, 0.1)
     elsewhere.set_state(plant.get_state())
-    assert elsewhere.strains is not None
-    elsewhere.strains.renew(elsewhere.qpos)
+    rods_of(elsewhere).strains.renew(elsewhere.qpos)
     assert np.array_equal(plant.model.wrap_prm, elsewhere.model.wrap_prm)
 
 

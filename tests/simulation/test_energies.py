@@ -68,8 +68,7 @@ def test_a_ringing_net_keeps_its_energy_but_for_dampers_and_edges(damping: float
             name = f"crossing_{crossing}"
             plant.data.qvel[plant.model.joint(f"{name}_x").dofadr[0]] = speed
             start += 0.5 * float(plant.model.body(name).mass[0]) * speed**2
-        assert plant.two_step is not None
-        plant.two_step.rest()
+            plant.mechanics.rest()
         elastic = []
         for _ in range(round(0.1 / step_s)):
             plant.step(np.zeros(3))
@@ -160,7 +159,7 @@ def test_the_totals_of_a_mass_on_a_spring_and_a_servo_lack_what_the_step_takes()
         for _ in range(round(0.8 / step_s)):
             x, v = float(data.qpos[0]), float(data.qvel[0])
             mujoco.mj_step(model, data)
-            before, powers = powers, energy_meter.read({n: getattr(data, n) for n in energy_meter.outputs}, data.ctrl)
+            before, powers = powers, energy_meter.read(data, data.ctrl)
             assert powers.tension[0] == pytest.approx(pulled(data, v), abs=1e-9)
             totals = totals.plus(done_in(step_s, np.array([x - float(data.qpos[0])]), before, powers))
         held = 0.5 * mass * data.qvel[0] ** 2 + 0.5 * rate * (data.qpos[0] + 0.1) ** 2 - 0.5 * rate * 0.1**2
@@ -186,8 +185,7 @@ def test_the_tension_of_a_muscle_that_sets_in_at_once_is_what_draws_its_load(ste
     for step in range(round(0.2 / step_s)):
         before = float(data.qvel[0])
         mujoco.mj_step(model, data)
-        engine = {name: getattr(data, name) for name in energy_meter.outputs}
-        tension = energy_meter.read(engine, data.ctrl).tension
+        tension = energy_meter.read(data, data.ctrl).tension
         assert tension[0] == pytest.approx(pulled(data, before), rel=1e-6)
         if step == 0:
             assert 0.0 < tension[0] < -data.actuator_force[0], "the load yields within the step"

@@ -141,7 +141,7 @@ def test_a_worm_at_rest_on_a_thing_presses_on_it_with_its_weight(kind: str) -> N
     assert -0.01 < plant._depth_m() < 0.004
     assert plant.alarm() is None
     if kind == "slab":
-        assert plant._forces.met.force[0] == pytest.approx(-felt.contact_force_N.sum(axis=0), abs=1e-9)
+        assert plant._encounter.force[0] == pytest.approx(-felt.contact_force_N.sum(axis=0), abs=1e-9)
         assert plant.total_mass_kg == pytest.approx(plant_in("").total_mass_kg)
 
 

@@ -10,11 +10,11 @@ import mujoco
 import numpy as np
 import pytest
 
+from annelid.body.formulations.rods.two_step import TwoStep
 from annelid.config import load_config
 from annelid.errors import SimulationStopped
 from annelid.simulation.adjust import adjusted
 from annelid.simulation.stepping import build_controller, start
-from annelid.simulation.two_step import TwoStep
 from annelid.simulation.worm import WormPlant
 
 COARSE = {"body.mesh.elements_per_side": 1}
@@ -85,7 +85,7 @@ def test_in_a_scene_whose_bodies_move_the_step_is_the_engine_s(tmp_path: Path) -
         worm.move(np.zeros(3), 1)
         highest = max(highest, abs(float(worm.qpos[-1])))
     assert highest < 0.7
-    assert np.abs(worm.engine["qvel"][-7:-1]).max() < 1e-3
+    assert np.abs(worm.data.qvel[-7:-1]).max() < 1e-3
 
 
 def test_an_error_of_the_engine_stops_the_worm_with_its_words(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -109,8 +109,7 @@ def test_a_clock_that_changes_while_it_runs_starts_from_rest() -> None:
         running.advance()
     going = adjusted(running, config, finer)
     assert isinstance(going.plant, WormPlant)
-    assert going.plant.two_step is not None
-    assert np.array_equal(going.plant.two_step.get_state()["qpos_before"], going.plant.qpos)
+    assert np.array_equal(going.plant.mechanics.get_state()["qpos_before"], going.plant.qpos)
 
 
 def test_a_worm_goes_on_from_its_state_to_the_bit() -> None:
@@ -124,7 +123,7 @@ def test_a_worm_goes_on_from_its_state_to_the_bit() -> None:
         for _ in range(3):
             worm.stride(pull)
     assert np.array_equal(first.qpos, second.qpos)
-    assert np.array_equal(first.engine["qvel"], second.engine["qvel"])
+    assert np.array_equal(first.data.qvel, second.data.qvel)
     assert first.energies.damping_loss == second.energies.damping_loss
     assert first.data.time == pytest.approx(7 * step_s)
 

@@ -66,7 +66,6 @@ def build_spec(config: RunConfig, *, for_plant: bool = False) -> mujoco.MjSpec:
         softest_s = step_s * (1.5 if arena.has_moving_planes else 1.0)
         arena = arena.model_copy(update={"contact_time_constant_s": max(arena.contact_time_constant_s, softest_s)})
     spec.option.gravity = gravity_of(arena)
-    spec.option.cone = getattr(mujoco.mjtCone, f"mjCONE_{body.formulation.friction_cone.upper()}")
     spec.stat.extent = geometry.length_m
     spec.stat.center = [geometry.length_m / 2, 0.0, geometry.radius_m]
     body.formulation.add(spec, geometry, body, arena, for_plant=for_plant)
@@ -134,8 +133,8 @@ def mjcf_text(config: RunConfig, keyframes: Sequence[Mapping[str, Any]] = ()) ->
     spec, body = build_spec(config), worm_of(config)
     if body.strands.stiffness_differs and spec.flexes:
         raise ConfigError(
-            "body.strands: stiffness that differs along rods or among them cannot be written as MJCF, where a rod has "
-            "one: take body.formulation.kind = 'chain', or run the worm with annelid"
+            "body.strands: stiffness that differs along rods cannot be written as MJCF, where a rod has one: take "
+            "body.formulation.kind = 'chain', or run the worm with annelid"
         )
     if body.heading_deg:
         raise ConfigError(
@@ -151,7 +150,10 @@ def mjcf_text(config: RunConfig, keyframes: Sequence[Mapping[str, Any]] = ()) ->
     for keyframe in (*rest, *keyframes):
         spec.add_key(**{name: value for name, value in keyframe.items() if np.size(value)})
     compile_spec(spec)
-    lacks = body.formulation.lacks_in_mjcf(body)
-    if lacks:
-        warnings.warn(lacks, stacklevel=2)
+    if spec.flexes and body.mesh.elements_per_side > 1:
+        warnings.warn(
+            "a rod in MJCF is equally stiff at every vertex, while annelid bends it as forces at its crossings do: the "
+            "segments of the written worm elongate by 7 % less than here with two elements a side, by 1 % with six",
+            stacklevel=2,
+        )
     return spec.to_xml()

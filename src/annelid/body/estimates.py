@@ -17,10 +17,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from math import cos, hypot, tan
-from statistics import fmean
 
 from annelid.body.mesh import MeshBody
-from annelid.config.run import Finding
+from annelid.config.answers import Finding
 from annelid.morphology import Rhombus, rhombus
 
 HARDLY = 0.02
@@ -55,8 +54,7 @@ def bearable_force_N(body: MeshBody, share: float = 1 / 3) -> float:
     """
     shape, springs = rhombus_of(body), body.springs
     rest, opening = shape.opening_rad, share * shape.opening_rad
-    rigidity = body.strands.bending_rigidity_Nm2 * fmean(body.strands.relative_stiffness or [1.0])
-    bending = _BENDING * rigidity * (rest - opening) / (shape.side_m**2 * cos(opening))
+    bending = _BENDING * body.strands.bending_rigidity_Nm2 * (rest - opening) / (shape.side_m**2 * cos(opening))
     spring_m = shape.along_m if springs.rest_length_m is None else springs.one_number("rest_length_m")
     stretch = hypot(shape.across_m, shape.along_m) * cos(opening) - spring_m
     if springs.tension_only:

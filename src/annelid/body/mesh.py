@@ -7,7 +7,8 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, field_validator
 
-from annelid.config.run import BodyKind, Elements
+from annelid.config.answers import Elements
+from annelid.config.run import BodyKind
 from annelid.config.sections import Length, Modulus, NonNegative, PerSegmentOf, Positive, Section
 from annelid.morphology import MeshGeometry, helical_mesh
 
@@ -80,11 +81,6 @@ class Strands(Section):
     shear_modulus_Pa: PerSegmentOf[Modulus] = Field(
         default=0.2e9, description="resists twisting, one number for all or one per segment"
     )
-    relative_stiffness: tuple[Annotated[float, Field(ge=1e-3, le=1e3)], ...] | None = Field(
-        default=None,
-        description="of every strand, in bending and in twist, over what moduli and radius give: one number per "
-        "strand, first all clockwise ones, then all others (not set: all alike)",
-    )
     linear_density_kg_per_m: PerSegmentOf[Positive] = Field(
         default=0.01291, description="mass per length of strand, one number for all or one per segment"
     )
@@ -101,10 +97,9 @@ class Strands(Section):
 
     @property
     def stiffness_differs(self) -> bool:
-        """Whether it is not that of one material everywhere."""
+        """Whether segments have strands of another material."""
         moduli = (self.young_modulus_Pa, self.shear_modulus_Pa)
-        along = any(isinstance(value, tuple) and len(set(value)) > 1 for value in moduli)
-        return along or any(share != 1.0 for share in self.relative_stiffness or ())
+        return any(isinstance(value, tuple) and len(set(value)) > 1 for value in moduli)
 
 
 class Pins(Section):

@@ -15,8 +15,9 @@ from annelid.body.checks import ground_findings, material_findings, mesh_finding
 from annelid.body.estimates import rhombus_of
 from annelid.body.formulations import FormulationKind
 from annelid.body.mesh import MeshBody
+from annelid.config.answers import Finding
 from annelid.config.kinds import Choice, default_of
-from annelid.config.run import Finding, RunConfig
+from annelid.config.run import RunConfig
 from annelid.config.sections import Section
 from annelid.errors import ConfigError, listed, shown
 from annelid.protocols import Plant
@@ -51,8 +52,13 @@ class WormBody(MeshBody):
         return import_module("annelid.simulation.worm").WormPlant(config)
 
     def refuse_fidelity(self, level: str) -> None:
-        """Refuses a level where the formulation does."""
-        self.formulation.refuse_fidelity(level)
+        """Refuses a level unless strands share their crossings, as those with which its errors were measured."""
+        if not self.has_rigid_crossings:
+            raise ConfigError(
+                f"fidelity = {level!r} is measured for rods that share their pins (body.formulation.kind = 'rods', "
+                "body.formulation.pins = 'shared'): set body.mesh.elements_per_side and clock.physics_timestep_s, or "
+                "take the preset riddle2023-rods"
+            )
 
     @property
     def has_halves(self) -> bool:
@@ -105,7 +111,7 @@ class WormBody(MeshBody):
             measured: other than rods with rigid crossings, with a damping time of 0.05 to 0.4 s, muscles all round,
             springs that are at rest as drawn, and segments that are alike.
         """
-        if len(self.groups()) > 1 or self.strands.relative_stiffness is not None or self.relative_friction is not None:
+        if len(self.groups()) > 1 or self.relative_friction is not None:
             return None
         damping_s, rings, rate = self.strands.damping_time_s, self.rings, self.springs.one_number("stiffness_N_per_m")
         measured = self.has_rigid_crossings and rings.muscle is not None and not self.has_halves
@@ -193,13 +199,6 @@ class WormBody(MeshBody):
                     f"{path}.{name} = {shown(list(getattr(section, name)))} has {given} numbers for {n} segments: "
                     f"give a number, or {n} numbers, one per segment"
                 )
-        of_strands, n_strands = self.strands.relative_stiffness, mesh.n_helices
-        if of_strands is not None and len(of_strands) != n_strands:
-            raise ValueError(
-                f"body.strands.relative_stiffness = {shown(list(of_strands))} has {len(of_strands)} numbers for "
-                f"{n_strands} strands: give {n_strands} numbers, one per strand, or 'none'"
-            )
-        self.formulation.check_body(self)
         if self.strands.radius_m >= min(mesh.radii_m):
             raise ValueError(
                 f"body.strands.radius_m = {self.strands.radius_m:g} must be less than body.mesh.radius_m = "

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TypeVar
 
 from annelid.arena.geoms import set_friction
+from annelid.body.worm import worm_of
 from annelid.config import RunConfig
 from annelid.errors import ConfigError
 from annelid.protocols import State, Stateful
@@ -35,9 +36,9 @@ def adjusted(running: Simulation, before: RunConfig, after: RunConfig) -> Simula
             set_friction(plant.model, after.arena.friction)
         else:
             plant = _taking_over(build_plant(after), plant, "body")
-            if differ("clock") and isinstance(plant, WormPlant) and plant.two_step is not None:
+            if differ("clock") and isinstance(plant, WormPlant):
                 # Its state of one step ago is that of a step of another length.
-                plant.two_step.rest()
+                plant.mechanics.rest()
     if any(
         getattr(before, part) != getattr(after, part) for part in ("controller", "turning", "sensor", "clock", "trial")
     ):
@@ -51,7 +52,7 @@ def _differ_in_friction_only(before: RunConfig, after: RunConfig) -> bool:
     if before.arena is None or after.arena is None or before.arena.has_setae or after.arena.has_setae:
         return False
     # Some parts of the skin, or of a scene, have a friction of their own.
-    if after.arena.is_scene or getattr(before.body, "relative_friction", None) is not None:
+    if after.arena.is_scene or worm_of(before).relative_friction is not None:
         return False
     alike = before.arena.model_copy(update={"friction": after.arena.friction})
     return (before.body, alike, before.clock, before.trial) == (after.body, after.arena, after.clock, after.trial)

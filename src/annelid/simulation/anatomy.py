@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from math import atan2, cos, sin
 from typing import NamedTuple
 
@@ -10,17 +9,15 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.arena.geoms import touching
+from annelid.arena.geoms import skin_geoms
 from annelid.arena.ground import surface_of
 from annelid.arena.surface import Surface
 from annelid.body.actuation import crossing_site, ring_names, stretch_sensors
-from annelid.body.formulations.rods.strains import RodVertices
-from annelid.body.rows import Ties
 from annelid.body.worm import WormBody
 from annelid.config import ArenaKind
 from annelid.morphology import Array, MeshGeometry, heading_turn, norm
 from annelid.simulation.energies import Elasticity, EnergyMeter
-from annelid.simulation.objects import Met, Objects, add_scene_sensors, in_scene
+from annelid.simulation.objects import Objects, add_scene_sensors, in_scene
 from annelid.simulation.skin import Skin
 
 _NET_FORCE = 3
@@ -38,7 +35,7 @@ def add_contact_sensors(spec: mujoco.MjSpec, arena: ArenaKind) -> None:
         return
     force = 1 << int(mujoco.mjtConDataField.mjCONDATA_FORCE)
     grounds = [geom.name for geom in spec.geoms if geom.contype]
-    pairs = [(ground, geom.name) for geom in touching(spec) for ground in grounds]
+    pairs = [(ground, geom.name) for geom in skin_geoms(spec) for ground in grounds]
     pairs += [(pair.geomname1, pair.geomname2) for pair in spec.pairs]
     for ground, skin in pairs:
         spec.add_sensor(
@@ -67,15 +64,6 @@ class Posture(NamedTuple):
     objects: Array  # centres of mass of what moves in a scene, (n_objects, 3)
 
 
-class Forces(NamedTuple):
-    """What acted during the last physics step."""
-
-    contact: Array  # force of the arena on every segment, N, (n_segments, 3)
-    edge_strain: Array  # largest strain of a rod's edge, (); 0 for a chain
-    pin_gap: Array  # largest gap between two pinned strands, m, (); 0 where pins cannot part
-    met: Met  # what was met in a scene
-
-
 class Anatomy:
     """The parts of one compiled worm, found once.
 
@@ -86,11 +74,8 @@ class Anatomy:
         objects: What moves in a scene.
         total_mass_kg: Mass of the worm.
         first_act: The engine's actuator states before the first step, ``(n_states,)``.
-        has_edges: Whether strands are rods, whose edges may be strained.
-        pins_can_part: Whether the two strands of a crossing may part.
-        elasticity: The energy that joints, springs and ties store.
+        elasticity: The energy that joints and springs store.
         energy_meter: What a physics step does, in work.
-        outputs: Names of the engine's arrays that `forces` needs.
     """
 
     def __init__(self, model: mujoco.MjModel, body: WormBody, arena: ArenaKind) -> None:
@@ -106,28 +91,19 @@ class Anatomy:
         self._sensors = stretch_sensors(self.geometry, body.springs)
         self.rest_stretch_m = self.geometry.spring_length_m[self._sensors]
         self.first_act = body.rings.first_act(model)
-        self.has_edges = bool(model.nflexedge)
         self._crossing_site = np.array([model.site(crossing_site(i)).id for i in range(self.geometry.n_crossings)])
         self.crossing_body: NDArray[np.int32] = model.site_bodyid[self._crossing_site]
         self._crossing_dof: NDArray[np.intp] | None = None
-        if body.formulation.has_rods:
+        if model.nflex:
             slide = model.body_dofadr[self.crossing_body][:, np.newaxis] + np.arange(3)
             self._crossing_dof = slide.astype(np.intp)
         self.ring_path = np.stack([self._path_of(model.tendon(name).id) for name in self.muscle_names])
         mass = np.where(in_scene(model), 0.0, model.body_mass)
         self.total_mass_kg = float(mass.sum())
         self._mass_share = mass / mass.sum()
-        self._edges_per_m = 1.0 / model.flexedge_length0
         self.objects = Objects(model, arena)
         self._find_skin(surface_of(arena))
-        self._pin_gap, pin_outputs = body.formulation.pin_reader(model, self.geometry)
-        self.pins_can_part = self._pin_gap is not None
-        tie = body.formulation.tie
-        ties = None if tie is None else Ties(model, tie)
-        self.elasticity = Elasticity(model, ties)
-        self.energy_meter = EnergyMeter(model, body.rings, ties)
-        self._vertices = RodVertices(model) if self.has_edges else None
-        self.outputs: tuple[str, ...] = ("sensordata", *(("qpos",) if self.has_edges else ()), *pin_outputs)
+        self.elasticity, self.energy_meter = Elasticity(model), EnergyMeter(model, body.rings)
 
     def _path_of(self, tendon: int) -> NDArray[np.int64]:
         """Crossings along a ring tendon."""
@@ -164,13 +140,6 @@ class Anatomy:
             self.objects.places(data),
         )
 
-    def _edge_strain(self, vertices: RodVertices, qpos: Array) -> Array:
-        """The largest strain of an edge, ``()``."""
-        edge = np.diff(vertices.at(qpos), axis=-1)
-        squares = edge * edge
-        lengths = np.sqrt(squares[..., 0, :, :] + squares[..., 1, :, :] + squares[..., 2, :, :])
-        return np.abs(lengths.reshape(*lengths.shape[:-2], -1) * self._edges_per_m - 1.0).max(axis=-1)
-
     def posture(self, crossing: Array, center_of_mass: Array, skin: Array, objects: Array) -> Posture:
         """Measures all lengths from the positions of the crossings and adds the others that `locate` gives."""
         ends = crossing.take(self.geometry.springs, axis=-2)
@@ -193,19 +162,13 @@ class Anatomy:
         along, apart = place[..., 1, :] - place[..., 0, :], velocity[..., 1, :] - velocity[..., 0, :]
         return (along * apart).sum(axis=-1) / posture.stretch
 
-    def forces(self, engine: Mapping[str, Array]) -> tuple[Forces, Array]:
-        """Reads what acted during the last physics step, and the ground's force on each geom, N, ``(n_geoms, 3)``.
+    def contacts(self, data: mujoco.MjData) -> tuple[Array, Array]:
+        """Reads the ground's forces during the last physics step, N.
 
-        The muscles' pull is read by the energy meter. Of the engine's arrays those named in `outputs` are needed.
+        Returns those on every segment, ``(n_segments, 3)``, and on every geom of the skin, ``(n_geoms, 3)``.
         """
-        by_geom = engine["sensordata"][self._contact_slice].reshape(-1, 3)
-        contact = self._segment_rows @ by_geom
-        strain = gap = np.zeros(())
-        if self._vertices is not None:
-            strain = self._edge_strain(self._vertices, engine["qpos"])
-        if self._pin_gap is not None:
-            gap = self._pin_gap(engine)
-        return Forces(contact, strain, gap, self.objects.met(engine)), by_geom.copy()
+        by_geom = data.sensordata[self._contact_slice].reshape(-1, 3).copy()
+        return self._segment_rows @ by_geom, by_geom
 
 
 def _unit(vectors: Array) -> Array:

@@ -9,19 +9,14 @@ constraints, dampers, springs, and actuators, which `discrete` takes at the end 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from collections.abc import Iterable
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from annelid.body.actuators import ActuatorKind
-from annelid.body.rows import Ties
 from annelid.morphology import Array
-
-Engine = Mapping[str, NDArray[Any]]
-"""The engine's arrays of one worm by name."""
 
 
 class EnergyTotals(NamedTuple):
@@ -58,25 +53,10 @@ class Powers(NamedTuple):
 
 
 class EnergyMeter:
-    """Reads from the engine's arrays, those named in ``outputs``, what acts at the end of a physics step."""
+    """Reads what acts at the end of a physics step."""
 
-    outputs = (
-        "qpos",
-        "qvel",
-        "qacc",
-        "qfrc_damper",
-        "qfrc_constraint",
-        "actuator_force",
-        "actuator_length",
-        "actuator_velocity",
-        "actuator_moment",
-        "moment_colind",
-        "moment_rowadr",
-    )
-
-    def __init__(self, model: mujoco.MjModel, rings: ActuatorKind, ties: Ties | None = None) -> None:
-        """Takes a compiled worm, and its pins' ties."""
-        self._ties = ties
+    def __init__(self, model: mujoco.MjModel, rings: ActuatorKind) -> None:
+        """Takes a compiled worm."""
         self._engine_s = float(model.opt.timestep)
         # Other integrators take the actuators' forces as they are at the start of a step.
         implicit = model.opt.integrator == int(mujoco.mjtIntegrator.mjINT_DISCRETE)
@@ -84,31 +64,28 @@ class EnergyMeter:
         self._dof_damping = model.dof_damping.copy() if implicit and model.dof_damping.any() else None
         self.motor_power = rings.motor_power(model)
 
-    def read(self, engine: Engine, drive: Array, rods: tuple[float, float] = (0.0, 0.0)) -> Powers:
+    def read(self, data: mujoco.MjData, drive: Array, losses_W: Iterable[tuple[float, float]] = ()) -> Powers:
         """Returns what acts at the end of a step.
 
         Args:
-            engine: The engine's arrays of one worm after the step.
+            data: The engine's data after the step.
             drive: What the actuators' gain was multiplied by during it, ``(n_muscles,)``.
-            rods: Power that the material of rods takes, and the whole power that their rows take, W.
+            losses_W: What is lost to dampers, and taken for that of constraints, as `Mechanics.losses_W` yields it.
         """
-        velocity = engine["qvel"]
+        velocity = data.qvel
         # Rates of the actuators' lengths, m/s, with the lever arms of the step.
-        products = engine["actuator_moment"] * velocity[engine["moment_colind"]]
-        rate, earlier = np.add.reduceat(products, engine["moment_rowadr"]), engine["actuator_velocity"]
-        tension = -engine["actuator_force"]
+        products = data.actuator_moment * velocity[data.moment_colind]
+        rate, earlier = np.add.reduceat(products, data.moment_rowadr), data.actuator_velocity
+        tension = -data.actuator_force
         if self.slopes is not None:
-            per_length, per_rate = self.slopes(engine["actuator_length"], earlier, drive, tension)
+            per_length, per_rate = self.slopes(data.actuator_length, earlier, drive, tension)
             tension = tension + per_length * (self._engine_s * rate) + per_rate * (rate - earlier)
-        damper = engine["qfrc_damper"]
+        damper = data.qfrc_damper
         if self._dof_damping is not None:
-            damper = damper - self._dof_damping * (self._engine_s * engine["qacc"])
-        damped, constrained = -float(damper @ velocity), -float(engine["qfrc_constraint"] @ velocity)
-        # The engine counts rows among its constraints.
-        damped, constrained = damped + rods[0], constrained - rods[1]
-        if self._ties is not None:
-            springs, dashpots = self._ties.power_W(engine["qpos"], velocity)
-            damped, constrained = damped + dashpots, constrained - dashpots - springs
+            damper = damper - self._dof_damping * (self._engine_s * data.qacc)
+        damped, constrained = 0.0 - float(damper @ velocity), -float(data.qfrc_constraint @ velocity)
+        for of_damper, of_constraint in losses_W:
+            damped, constrained = damped + of_damper, constrained - of_constraint
         taken = np.zeros_like(tension) if self.motor_power is None else self.motor_power(tension, -rate)
         return Powers(tension, damped, constrained, taken)
 
@@ -127,10 +104,9 @@ def done_in(time_s: float, shortening_m: Array, before: Powers, after: Powers) -
 
 
 class Elasticity:
-    """The elastic energy of one compiled body as a function of its coordinates, without that of rods."""
+    """The elastic energy of one compiled body as a function of its coordinates, without that of rods and ties."""
 
-    def __init__(self, model: mujoco.MjModel, ties: Ties | None) -> None:
-        self._ties = ties
+    def __init__(self, model: mujoco.MjModel) -> None:
         springs = [i for i in range(model.ntendon) if model.tendon(i).name.startswith("spring_")]
         self._spring_rate = model.tendon_stiffness[springs].copy()
         self._spring_slack = model.tendon_lengthspring[springs].T.copy()
@@ -149,5 +125,4 @@ class Elasticity:
         """
         stretch = spring_length_m - spring_length_m.clip(*self._spring_slack)
         angle = qpos[self._angle] - self._angle_at_rest
-        energy = 0.5 * float(self._spring_rate @ (stretch * stretch) + self._joint_rate @ (angle * angle))
-        return energy + (0.0 if self._ties is None else self._ties.energy_J(qpos))
+        return 0.5 * float(self._spring_rate @ (stretch * stretch) + self._joint_rate @ (angle * angle))

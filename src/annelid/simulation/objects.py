@@ -6,14 +6,13 @@ every part of the skin the net force on it, and depth and normal of its deepest 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.arena.geoms import SCENE, touching
+from annelid.arena.geoms import SCENE, skin_geoms
 from annelid.config import ArenaKind
 from annelid.morphology import Array
 
@@ -26,15 +25,15 @@ _FORCE, _PLACE = (
 )
 
 
-class Met(NamedTuple):
-    """What a worm met in a scene during the last physics step."""
+class Encounter(NamedTuple):
+    """What a worm touched in a scene during the last physics step."""
 
     force: Array  # of the worm on every body that moves, N, (n_objects, 3)
     depth: Array  # of the deepest vertex, m, (); negative above the ground
     normal: Array  # unit vectors out of what each geom of the skin touches, 0 where it touches nothing, (n_geoms, 3)
 
 
-NOTHING = Met(np.zeros((0, 3)), np.array(-np.inf), np.zeros((0, 3)))
+NO_ENCOUNTER = Encounter(np.zeros((0, 3)), np.array(-np.inf), np.zeros((0, 3)))
 
 
 def in_scene(model: mujoco.MjModel) -> NDArray[np.bool_]:
@@ -45,7 +44,7 @@ def in_scene(model: mujoco.MjModel) -> NDArray[np.bool_]:
 def add_scene_sensors(spec: mujoco.MjSpec, object_names: tuple[str, ...]) -> None:
     """Adds sensors of what touches every part of the skin, and of the force of each on every body that moves."""
     kinds = mujoco.mjtObj
-    skin = [geom.name for geom in touching(spec)]
+    skin = [geom.name for geom in skin_geoms(spec)]
     for what, fields, reduce in (("net", _FORCE, _NET_FORCE), ("deepest", _PLACE, _DEEPEST)):
         for name in skin:
             spec.add_sensor(
@@ -96,14 +95,14 @@ class Objects:
         """Energy of their weight, J, zero at the model's origin."""
         return -float((self._weight_N * places_m).sum())
 
-    def met(self, engine: Mapping[str, Array]) -> Met:
-        """Reads the sensors from the engine's arrays."""
+    def read(self, data: mujoco.MjData) -> Encounter:
+        """Reads the sensors; the force is zero, and there are no normals, where nothing can be met."""
         if not self._is_scene:
-            return NOTHING
-        values, first, last = engine["sensordata"], self._first, self._first + 4 * self.n_skin
+            return NO_ENCOUNTER
+        values, first, last = data.sensordata, self._first, self._first + 4 * self.n_skin
         deepest = values[first:last].reshape(-1, 4)
         forces = values[last : last + 3 * self.n_skin * len(self.names)]
         force = forces.reshape(len(self.names), self.n_skin, 3).sum(axis=-2)
         # Without a contact all numbers are 0: then the skin's surface is at the ground at most.
         depth = -deepest[:, 0].min() - self._radius_m
-        return Met(force, depth, deepest[:, 1:].copy())
+        return Encounter(force, depth, deepest[:, 1:].copy())

@@ -13,26 +13,27 @@ from annelid.arena.course import LEFT
 from annelid.arena.ground import surface_of
 from annelid.arena.surface import Plane
 from annelid.body import build_spec, compile_spec
-from annelid.body.formulations.rods.strains import RodStrains, net_stiffness
+from annelid.body.mechanics import NO_GAP
 from annelid.body.rows import tendons_to_rows
 from annelid.body.worm import WormBody, worm_of
 from annelid.clock import SLACK_S, StepRatio
 from annelid.config import ArenaKind, RunConfig
-from annelid.config.run import Walls
+from annelid.config.answers import Walls
 from annelid.errors import SimulationStopped
 from annelid.morphology import Array, heading_turn
 from annelid.plausibility import check, refuse_nonsense
 from annelid.protocols import SIDES, Recordable, Sensation, Signal, State, Values
-from annelid.simulation.anatomy import Anatomy, Forces, Posture, add_contact_sensors, laid_down
+from annelid.simulation.anatomy import Anatomy, Posture, add_contact_sensors, laid_down
 from annelid.simulation.energies import EnergyTotals, Powers, done_in
 from annelid.simulation.ground import MovingGround
-from annelid.simulation.objects import NOTHING
+from annelid.simulation.objects import NO_ENCOUNTER
 from annelid.simulation.skin import Touch
-from annelid.simulation.two_step import TwoStep
 from annelid.simulation.watch import Energies, Watch
 
 STATE_PARTS = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 """All that the engine's next step depends on: positions, velocities, activations, warm start."""
+MOST_GAP_M = 0.15
+"""Gap at a pin at which a run is stopped; soft crossings part by up to 4 cm in a healthy one."""
 _log = logging.getLogger(__name__)
 # Otherwise the engine prints its warnings and writes them to a file in the user's folder; `alarm` reports them.
 mujoco.set_mju_user_warning(lambda message: _log.info("%s", message))
@@ -54,7 +55,7 @@ _SIGNALS = {
     "spring_length": ("posture.spring_length", ("spring",), "m", "length of an axial spring"),
     "ring_length": ("posture.ring_length", ("muscle",), "m", "length of a ring muscle"),
     "muscle_force": ("_tension_N", ("muscle",), "N", _FORCE),
-    "contact_force": ("_forces.contact", ("segment", "axis"), "N", "force of the arena on a segment"),
+    "contact_force": ("_contact_N", ("segment", "axis"), "N", "force of the arena on a segment"),
     "touch": ("touch.normal", ("segment", "side"), "N", "normal force of the ground on a side"),
     "contact_count": ("touch.count", ("segment",), "1", "number of vertices that touch the ground"),
     "slip_speed": ("touch.slip_speed", ("segment",), "m/s", "forward speed along the ground of what touches it"),
@@ -80,9 +81,9 @@ _SIGNALS = {
         "energy lost to contacts, friction and inextensible edges so far",
     ),
     "object_position": ("posture.objects", ("object", "axis"), "m", "centre of mass of a body that moves in the scene"),
-    "object_force": ("_forces.met.force", ("object", "axis"), "N", "force of the worm on a body that moves"),
-    "edge_strain": ("_forces.edge_strain", (), "1", "largest strain of a rod's edge"),
-    "pin_gap": ("_forces.pin_gap", (), "m", "largest gap between two pinned strands"),
+    "object_force": ("_encounter.force", ("object", "axis"), "N", "force of the worm on a body that moves"),
+    "edge_strain": ("_edge_strain", (), "1", "largest strain of a rod's edge"),
+    "pin_gap": ("_pin_gap_m", (), "m", "largest gap between two pinned strands"),
 }
 """What is recorded: where a worm has it, its dimensions, its unit and what it is."""
 _FRAME_SIGNALS = {
@@ -130,8 +131,7 @@ class WormPlant:
         total_mass_kg: Mass of strands and pins.
         start: Where it starts.
         posture: Where the body is.
-        strains: Bending and twist of its rods; None for a chain.
-        two_step: What steps its rods; None for a chain.
+        mechanics: What steps it.
         touch: What the skin senses of the ground, and how far it has slid.
         energies: What the muscles have done so far, and where it went.
     """
@@ -160,20 +160,9 @@ class WormPlant:
         self._activation: Array = np.zeros(anatomy.n_muscles)
         data = self.data = mujoco.MjData(self.model)
         self.qpos, self.act, self.ctrl, self.warned = data.qpos, data.act, data.ctrl, data.warning.number
-        names = (*anatomy.outputs, *anatomy.energy_meter.outputs)
-        self.engine = {name: getattr(data, name) for name in names}
         self.start = laid_down(anatomy, body)
-        self.strains: RodStrains | None = None
-        self.two_step: TwoStep | None = None
-        if body.formulation.has_rods:
-            stiffness = net_stiffness(self.geometry, body.strands)
-            self.strains = RodStrains(self.model, stiffness, body.strands.damping_time_s)
-            first_order = body.formulation.engine_share(arena) == 1.0
-            self.two_step = TwoStep(self.model, data, self.strains, first_order=first_order)
-        moving = arena.has_moving_planes
-        self.ground = MovingGround(self.model, self.geometry, arena) if moving else None
-        # What the predicted end of a step has yet to move is nothing.
-        self._ahead_s = 0.0 if self.two_step is not None else self._step_s
+        self.mechanics = body.formulation.mechanics(self.model, data, self.geometry, body, arena, self._step_s)
+        self.ground = MovingGround(self.model, self.geometry, arena) if arena.has_moving_planes else None
         if config.trial is not None:
             ring = self.geometry.rings[self.n_segments // 2]
             self._pushed_N = np.zeros((len(anatomy.crossing_body), 3))
@@ -195,7 +184,9 @@ class WormPlant:
     def elastic_energy_J(self) -> float:
         """Energy that strands, joints and springs store, J."""
         energy = self.anatomy.elasticity.energy_J(self.qpos, self.posture.spring_length)
-        return energy if self.strains is None else energy + self.strains.energy_J(self.qpos)
+        for part in self.mechanics.energies_J():
+            energy += part
+        return energy
 
     def potential_energy_J(self) -> float:
         """Energy of the weight, also of what moves in a scene, J; zero with the centres of mass at the origin."""
@@ -228,25 +219,17 @@ class WormPlant:
                 self._take_step(self.act.copy() if self.model.na else activation)
         except mujoco.FatalError as error:
             raise SimulationStopped(f"the engine stopped at {self.data.time:.3f} s: {error}") from None
-        self._forces, ground_N = self.anatomy.forces(self.engine)
-        self._rate = None
-        normals = self._forces.met.normal if self._is_scene else None
+        self._contact_N, ground_N = self.anatomy.contacts(self.data)
+        self._encounter, self._rate = self.anatomy.objects.read(self.data), None
+        self._edge_strain, self._pin_gap_m = self._gaps()
+        normals = self._encounter.normal if self._is_scene else None
         skin, axis, time_s = self.posture.skin, self.posture.axis, n_steps * self._step_s
         self.touch = self.anatomy.skin.touch(self.touch, ground_N, skin_before, skin, axis, time_s, normals)
 
     def _take_step(self, drive: Array) -> None:
         """Takes one physics step, with what the actuators' gain is multiplied by, and adds it to the energy totals."""
-        rods = (0.0, 0.0)
-        if self.two_step is None or self.strains is None:
-            self._prepare()
-            mujoco.mj_step(self.model, self.data)
-        else:
-            self.two_step.step(self._prepare)
-            # The engine's step is shorter than the whole.
-            self.data.time += self._step_s - self.model.opt.timestep
-            force, rate = self.two_step.rows()
-            rods = self.strains.loss_W(rate), -float(force @ rate)
-        powers = self.anatomy.energy_meter.read(self.engine, drive, rods)
+        self.mechanics.step(self._prepare)
+        powers = self.anatomy.energy_meter.read(self.data, drive, self.mechanics.losses_W())
         before, self.posture = self.posture, self._locate()
         shortening = before.ring_length - self.posture.ring_length
         self.energies = self.energies.plus(done_in(self._step_s, shortening, self._powers, powers))
@@ -255,7 +238,7 @@ class WormPlant:
     def _prepare(self) -> None:
         """Lays the ground under the skin where the engine has it now."""
         if self.ground is not None:
-            self.ground.lay(self.data, self._ahead_s)
+            self.ground.lay(self.data, self.mechanics.ahead_s)
 
     def push(self, force_N: Array) -> None:
         """Lets outside forces, N, ``(n_crossings, 3)``, act on the crossings from the next step on; zeros end it.
@@ -263,6 +246,11 @@ class WormPlant:
         They are in the model's axes, and the energy totals know nothing of their work.
         """
         self.data.xfrc_applied[self.anatomy.crossing_body, :3] = force_N
+
+    def _gaps(self) -> tuple[Array, Array]:
+        """Largest strain of an edge and largest gap at a pin, m, ``()``; 0 where there are none."""
+        strain, gap = self.mechanics.edge_strain(), self.mechanics.pin_gap_m()
+        return NO_GAP if strain is None else strain, NO_GAP if gap is None else gap
 
     @property
     def _tension_N(self) -> Array:
@@ -274,12 +262,10 @@ class WormPlant:
         mujoco.mj_resetData(self.model, self.data)
         self.act[:] = self.anatomy.first_act
         self.qpos[:] = self.start.qpos
-        if self.two_step is not None and self.strains is not None:
-            self.strains.place(self.qpos, self.start.turn)
-            self.two_step.rest()
+        self.mechanics.place(self.start.turn)
         self._control_step = 0
-        nothing = NOTHING._replace(force=np.zeros((len(self.anatomy.objects.names), 3)))
-        self._forces = Forces(np.zeros((n, 3)), np.zeros(()), np.zeros(()), nothing)
+        self._encounter = NO_ENCOUNTER._replace(force=np.zeros((len(self.anatomy.objects.names), 3)))
+        self._contact_N, self._edge_strain, self._pin_gap_m = np.zeros((n, 3)), NO_GAP, NO_GAP
         self.energies = EnergyTotals.zero(self.n_muscles)
         self._powers = Powers.none(self.n_muscles)
         self.touch = Touch.none(n)
@@ -325,7 +311,7 @@ class WormPlant:
             rest_stretch_m=self.anatomy.rest_stretch_m,
             ring_length_m=posture.ring_length,
             muscle_force_N=self._tension_N,
-            contact_force_N=self._forces.contact,
+            contact_force_N=self._contact_N,
             center_of_mass_m=posture.center_of_mass,
             touch_N=self.touch.normal,
             front_m=posture.front,
@@ -347,7 +333,7 @@ class WormPlant:
                 if self.warned[warning]:
                     return f"{words}; a shorter clock.physics_timestep_s or softer settings may help"
         guard, posture = self._config.guard, self.posture
-        strain, gap = float(self._forces.edge_strain), float(self._forces.pin_gap)
+        strain, gap = float(self._edge_strain), float(self._pin_gap_m)
         height = energy = 0.0
         due = self._control_step % (ALARM_EVERY * self._ratio.control_steps_per_move) == 0
         if due:
@@ -359,7 +345,7 @@ class WormPlant:
         for field, words, value, limit, unit in (
             ("guard.height_m", self._height_words, height, guard.height_m, " m"),
             ("guard.edge_strain", "edge strain of a rod", strain, guard.edge_strain, ""),
-            ("guard.pin_gap_m", "gap at a pin", gap, guard.pin_gap_m, " m"),
+            ("of pins", "gap at a pin", gap, MOST_GAP_M, " m"),
             ("guard.kinetic_energy_J", "kinetic energy", energy, guard.kinetic_energy_J, " J"),
         ):
             # Written so that NaN fails it.
@@ -371,7 +357,7 @@ class WormPlant:
     def _depth_m(self) -> float:
         """Depth of the deepest vertex in the ground, m; over moving planes, or in a scene, that in the last step."""
         if self._is_scene:
-            return float(self._forces.met.depth)
+            return float(self._encounter.depth)
         if self.ground is not None:
             return self.ground.depth_m
         return self._floor.offset_m - float(np.minimum.reduce(self.posture.skin @ self._floor.facing))
@@ -397,8 +383,8 @@ class WormPlant:
         anatomy = self.anatomy
         objects = anatomy.objects.names
         present = {
-            "edge_strain": anatomy.has_edges,
-            "pin_gap": anatomy.pins_can_part,
+            "edge_strain": self.mechanics.edge_strain() is not None,
+            "pin_gap": self.mechanics.pin_gap_m() is not None,
             "motor_energy": anatomy.energy_meter.motor_power is not None,
         }
         signals = (
@@ -421,7 +407,6 @@ class WormPlant:
 
     def get_state(self) -> State:
         """Returns the engine's whole state and what was sensed last."""
-        forces = self._forces
         engine = np.empty(mujoco.mj_stateSize(self.model, STATE_PARTS))
         mujoco.mj_getState(self.model, self.data, engine, STATE_PARTS)
         return {
@@ -429,11 +414,11 @@ class WormPlant:
             "control_step": np.array([self._control_step]),
             "muscle_force": self._powers.tension.copy(),
             "powers": np.array([self._powers.damping, self._powers.constraint, *self._powers.motor]),
-            "contact_force": forces.contact.copy(),
-            "extremes": np.array([forces.edge_strain, forces.pin_gap]),
+            "contact_force": self._contact_N.copy(),
+            "extremes": np.array([self._edge_strain, self._pin_gap_m]),
             **{name: np.array(total) for name, total in self.energies._asdict().items()},
-            **({"object_force": forces.met.force.copy()} if self._is_scene else {}),
-            **({} if self.two_step is None else self.two_step.get_state()),
+            **({"object_force": self._encounter.force.copy()} if self._is_scene else {}),
+            **self.mechanics.get_state(),
             **self.touch.state(),
             **self._watch.get_state(),
         }
@@ -441,17 +426,16 @@ class WormPlant:
     def set_state(self, state: State) -> None:
         """Restores what `get_state` returned; the run then continues bit for bit on the same machine."""
         mujoco.mj_setState(self.model, self.data, np.asarray(state["engine"], dtype=float), STATE_PARTS)
-        if self.two_step is not None:
-            self.two_step.set_state(state)
+        self.mechanics.set_state(state)
         self._control_step = int(state["control_step"][0])
-        strain, gap = np.asarray(state["extremes"], dtype=float)
+        self._edge_strain, self._pin_gap_m = np.asarray(state["extremes"], dtype=float)
         damping, constraint, *motor = np.asarray(state["powers"], dtype=float).tolist()
         tension = np.array(state["muscle_force"], dtype=float)
         self._powers = Powers(tension, damping, constraint, np.array(motor))
-        met = NOTHING
+        self._encounter = NO_ENCOUNTER
         if self._is_scene:
-            met = NOTHING._replace(force=np.array(state["object_force"], dtype=float))
-        self._forces = Forces(np.array(state["contact_force"], dtype=float), strain, gap, met)
+            self._encounter = NO_ENCOUNTER._replace(force=np.array(state["object_force"], dtype=float))
+        self._contact_N = np.array(state["contact_force"], dtype=float)
         self.energies = EnergyTotals(*(np.array(state[name], dtype=float) for name in EnergyTotals._fields))
         self.touch = Touch.of_state(state)
         self._watch.set_state(state)

@@ -218,7 +218,8 @@ def _sped_up(config: RunConfig, body: WormBody, haste: float) -> RunConfig:
     """Returns the worm weightless and away from the ground, with its viscous coefficients divided."""
     damping = {"damping_time_s": body.strands.damping_time_s / haste}
     changed: dict[str, object] = {"strands": body.strands.model_copy(update=damping)}
-    changed["formulation"] = body.formulation.hastened(haste)
+    viscous = {name: value / haste for name, value in body.formulation if name.endswith("_Ns_per_m")}
+    changed["formulation"] = body.formulation.model_copy(update=viscous)
     if body.joints is not None:
         viscous = {"viscous_friction_Nms_per_rad": body.joints.viscous_friction_Nms_per_rad / haste}
         changed["joints"] = body.joints.model_copy(update=viscous)

@@ -137,7 +137,7 @@ def engine_times(
     *phases, step = (
         float(spent[int(getattr(mujoco.mjtTimer, f"mjTIMER_{name.upper()}"))]) for name in (*ENGINE_PHASES, "step")
     )
-    if plant.two_step is not None:
+    if not plant.mechanics.ahead_s:
         # Of rods, position and velocity are computed by calls of their own.
         step += phases[0] + phases[1]
     plant_s = stepping.seconds - plant_before_s

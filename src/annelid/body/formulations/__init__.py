@@ -3,33 +3,33 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Iterator, Mapping
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple, Self
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from annelid.body.mesh import MeshBody, Strands
+from annelid.config.answers import Finding
 from annelid.config.kinds import Kind
-from annelid.config.run import ArenaKind, Finding, RunConfig
-from annelid.errors import ConfigError
+from annelid.config.run import ArenaKind, RunConfig
 from annelid.morphology import Array, MeshGeometry
 from annelid.registry import Registry
 
 if TYPE_CHECKING:
     import mujoco
 
+    from annelid.body.mechanics import Mechanics
+
 
 def stiffness_shares(geometry: MeshGeometry, strands: Strands) -> Array:
-    """Returns how stiff every strand is along itself, over the material of the first segment.
+    """Returns how stiff the strands are along themselves, over the material of the first segment.
 
     Returns:
-        Shares in bending and in twist at every inner vertex, ``(2, n_strands, n_vertices - 2)``.
+        Shares in bending and in twist at every inner vertex, alike in all strands, ``(2, n_vertices - 2)``.
     """
     each = [strands.of_segment(segment) for segment in range(geometry.n_segments)]
     moduli = np.array([[one.one_number("young_modulus_Pa"), one.one_number("shear_modulus_Pa")] for one in each])
-    along = geometry.along(moduli / moduli[0], geometry.vertices_m[0, 1:-1, 0])
-    of_strand = np.array(strands.relative_stiffness or [1.0] * geometry.n_strands)
-    return along.T[:, np.newaxis] * of_strand[:, np.newaxis]
+    return geometry.along(moduli / moduli[0], geometry.vertices_m[0, 1:-1, 0]).T
 
 
 def densities_kg_per_m(geometry: MeshGeometry, strands: Strands) -> Array:
@@ -41,9 +41,6 @@ def densities_kg_per_m(geometry: MeshGeometry, strands: Strands) -> Array:
 
 BDF2_SHARE = 2.0 / 3.0
 """Length of the engine's step over that of a whole step by BDF2."""
-
-PinReader = Callable[[Mapping[str, Array]], Array]
-"""Reads the largest gap at a pin, m, from the engine's arrays."""
 
 
 class Tie(NamedTuple):
@@ -58,29 +55,17 @@ class FormulationKind(Kind):
 
     Attributes:
         is_papers: Whether it is the paper's own, which other formulations are compared with.
-        friction_cone: Elliptic: friction is alike in every direction of sliding; pyramidal, the engine's default and
-            that of the authors' files: it is weaker by 16 % at 45 degrees to the world's axes.
-        has_rods: Whether strands are rods, whose rows a plant renews (`annelid.body.formulations.rods.strains`).
+        step_cost_ms: About how long a step of three segments with three elements a side takes, ms.
     """
 
     registry: ClassVar[Registry[type[Any]]] = Registry("body.formulation.kind", "annelid.body.formulations")
     default: ClassVar[str] = "rods"
     is_papers: ClassVar[bool] = False
-    friction_cone: ClassVar[Literal["elliptic", "pyramidal"]] = "elliptic"
-    has_rods: ClassVar[bool] = False
+    step_cost_ms: ClassVar[float]
 
     def engine_share(self, arena: ArenaKind) -> float:
-        """Length of the engine's step over the physics step of a plant: 1, or `BDF2_SHARE` (`simulation.two_step`)."""
+        """Length of the engine's step over the physics step of a plant: 1, or `BDF2_SHARE` (`rods.two_step`)."""
         return 1.0
-
-    @property
-    @abstractmethod
-    def step_cost_ms(self) -> float:
-        """About how long a step of three segments with three elements a side takes, ms."""
-
-    def lacks_in_mjcf(self, body: MeshBody) -> str:
-        """Returns a sentence on how a body differs from its model in an MJCF file, or ""."""
-        return ""
 
     @property
     def has_rigid_crossings(self) -> bool:
@@ -104,13 +89,6 @@ class FormulationKind(Kind):
             The time, s, and the memory, GB.
         """
 
-    def check_body(self, body: MeshBody) -> None:
-        """Checks the section against the rest of its body.
-
-        Raises:
-            ValueError: They do not fit.
-        """
-
     def findings(self, config: RunConfig) -> Iterator[Finding]:
         """Checks the physics step against what the formulation must resolve, before a run; by default finds nothing."""
         yield from ()
@@ -119,7 +97,7 @@ class FormulationKind(Kind):
     def add(
         self, spec: mujoco.MjSpec, geometry: MeshGeometry, body: MeshBody, arena: ArenaKind, *, for_plant: bool
     ) -> None:
-        """Adds the mesh with a site at every crossing, and the solver settings that it needs.
+        """Adds the mesh with a site at every crossing, and the solver settings and friction cone that it needs.
 
         Args:
             spec: An empty spec.
@@ -129,29 +107,23 @@ class FormulationKind(Kind):
             for_plant: For a plant of annelid, which prepares every step, as `annelid.body.build_spec`.
         """
 
-    def pin_reader(self, model: mujoco.MjModel, geometry: MeshGeometry) -> tuple[PinReader | None, tuple[str, ...]]:
-        """Finds what reads the largest gap at a pin.
+    @abstractmethod
+    def mechanics(
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        geometry: MeshGeometry,
+        body: MeshBody,
+        arena: ArenaKind,
+        step_s: float,
+    ) -> Mechanics:
+        """Returns what steps a body that `add` has built for a plant.
 
         Args:
             model: The compiled body.
+            data: The engine's data of it.
             geometry: The mesh at rest.
-
-        Returns:
-            The reader, None where pins cannot part, and names of the engine's arrays that it needs.
+            body: Materials and pins.
+            arena: Where it is.
+            step_s: Physics step, s.
         """
-        return None, ()
-
-    def refuse_fidelity(self, level: str) -> None:
-        """Refuses a level of fidelity, as `BodyKind.refuse_fidelity`.
-
-        Raises:
-            ConfigError: The levels were not measured with this formulation.
-        """
-        raise ConfigError(
-            f"fidelity = {level!r} is for worms of rods, not for body.formulation.kind = {self.kind!r}: set "
-            "body.mesh.elements_per_side and clock.physics_timestep_s, or take the preset riddle2023-rods"
-        )
-
-    def hastened(self, haste: float) -> Self:
-        """Returns the section with its viscous coefficients divided."""
-        return self

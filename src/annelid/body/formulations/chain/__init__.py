@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from math import inf
 from typing import TYPE_CHECKING, ClassVar, Literal
 
-import numpy as np
 from pydantic import Field
 
 from annelid.body.estimates import rhombus_of, softened
-from annelid.body.formulations import FormulationKind, PinReader
+from annelid.body.formulations import FormulationKind
 from annelid.body.mesh import MeshBody
-from annelid.config.run import ArenaKind, Finding, RunConfig
+from annelid.config.answers import Finding
+from annelid.config.run import ArenaKind, RunConfig
 from annelid.config.sections import Impedance, NonNegative, Positive
-from annelid.morphology import Array, MeshGeometry, norm
+from annelid.morphology import MeshGeometry
 
 if TYPE_CHECKING:
     import mujoco
+
+    from annelid.body.mechanics import Mechanics
 
 _RK4_DAMPED, _RK4_SWUNG = 2.78, 2.83
 """Largest products of step and rate, or frequency, at which the explicit Runge-Kutta method is stable."""
@@ -27,18 +29,13 @@ class Chain(FormulationKind):
     """The paper's formulation: rigid capsules on damped elastic joints, with a point mass at every pin."""
 
     is_papers: ClassVar[bool] = True
-    friction_cone: ClassVar[Literal["elliptic", "pyramidal"]] = "pyramidal"
+    step_cost_ms: ClassVar[float] = 15.2
     kind: Literal["chain"] = "chain"
     armature_kg_m2: NonNegative = Field(default=0.01, description="numerical inertia of the joints")
     pin_time_constant_s: Positive = Field(default=0.02, description="solref time constant of the pin constraints")
     pin_impedance: Impedance = Field(
         default=(0.9, 0.95, 0.001), description="solimp (d0, dwidth, width) of the pin constraints"
     )
-
-    @property
-    def step_cost_ms(self) -> float:
-        """About how long a step takes, ms."""
-        return 15.2
 
     def build_cost(self, n_elements: int, n_helices: int) -> tuple[float, float]:
         """Estimates time, s, and memory, GB; measured on one core."""
@@ -66,22 +63,19 @@ class Chain(FormulationKind):
         pin = {"solref": [self.pin_time_constant_s, 1.0], "solimp": [*self.pin_impedance, 0.5, 2.0]}
         add_chains(spec, geometry, body, arena, self.armature_kg_m2, pin, for_plant and arena.has_moving_planes)
 
-    def pin_reader(self, model: mujoco.MjModel, geometry: MeshGeometry) -> tuple[PinReader | None, tuple[str, ...]]:
-        """Reads the residual of the engine's connections, as `FormulationKind.pin_reader`."""
-        sides = ((model.eq_obj1id, model.eq_data[:, :3]), (model.eq_obj2id, model.eq_data[:, 3:6]))
+    def mechanics(
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        geometry: MeshGeometry,
+        body: MeshBody,
+        arena: ArenaKind,
+        step_s: float,
+    ) -> Mechanics:
+        """Returns the engine's own step, as `FormulationKind.mechanics`."""
+        from annelid.body.formulations.chain.capsules import ChainMechanics
 
-        def gap(engine: Mapping[str, Array]) -> Array:
-            position, turn = engine["xpos"], engine["xmat"]
-            turn = turn.reshape(*turn.shape[:-1], 3, 3)
-            first, second = (
-                position.take(body, axis=-2) + (turn.take(body, axis=-3) * local[:, np.newaxis]).sum(axis=-1)
-                for body, local in sides
-            )
-            residual = first - second
-            # Two connections make one crossing.
-            return norm(residual[..., 0::2, :] - residual[..., 1::2, :]).max(axis=-1)
-
-        return gap, ("xpos", "xmat")
+        return ChainMechanics(model, data, step_s)
 
 
 def _largest_step_s(body: MeshBody, formulation: Chain) -> float:

@@ -86,7 +86,9 @@ def net_stiffness(geometry: MeshGeometry, strands: Strands) -> Array:
         weights[crossing[0] + 1 : crossing[-1]] = 1.0 - 1.0 / n**2
         weights[crossing[1:-1]] = 1.0 + 1.0 / n
     lengths = np.linalg.norm(np.diff(geometry.vertices_m, axis=1), axis=-1)
-    return vertex_stiffness(lengths, strands.of_segment(0), stiffness_shares(geometry, strands) * weights[1:-1])
+    return vertex_stiffness(
+        lengths, strands.of_segment(0), stiffness_shares(geometry, strands)[:, np.newaxis] * weights[1:-1]
+    )
 
 
 def add_strains(spec: mujoco.MjSpec, rod: str, bodies: list[str], stiffness_Nm: Array, damping_s: float) -> None:

@@ -1,4 +1,4 @@
-"""A sweep: lines over one field, maps over two, a panel for each field over more."""
+"""A sweep: lines over one field, maps over two, lines over each of more."""
 
 from __future__ import annotations
 
@@ -31,33 +31,35 @@ def sweep_figure(data: xr.Dataset, fields: Sequence[str], numbers: Sequence[str]
     """Draws numbers over the varied fields; runs without a number are marked with crosses.
 
     Args:
-        data: The numbers along the fields of a grid or along ``sample``, perhaps along ``repeat``: their mean is drawn,
-            and its 95 % interval over one field.
+        data: The numbers along the fields of a grid or along ``sample``, perhaps along ``repeat``: over one field their
+            mean is drawn with its 95 % interval.
         fields: The varied fields, coordinates of the data.
-        numbers: Variables of the data, at most four; over three or more fields the first only, over each of them.
+        numbers: Variables of the data. Over three or more fields the first is drawn over each of them.
         stem: Path without suffix; ``.svg`` and ``.png`` are written, and the latter's path is returned.
     """
-    shown = [(field, numbers[0]) for field in fields] if len(fields) > 2 else [(fields[0], name) for name in numbers]
-    columns = min(2, len(shown))
-    rows = ceil(len(shown) / columns)
-    with canvas(0.5 + _PANEL_IN[1] * rows, _PANEL_IN[0] * columns if len(shown) > 1 else 4.6) as figure:
-        panels = figure.subplots(rows, columns, squeeze=False).ravel()
-        for i, (axes, (field, name)) in enumerate(zip(panels, shown, strict=False)):
-            if len(fields) != 2:
-                _line(axes, data, field, name, interval=len(fields) == 1)
-                continue
-            _map(figure, axes, data, fields, name)
-            if i % columns:
-                axes.set_ylabel("")
-        for axes in panels[len(shown) :]:
+    if len(fields) > 2:
+        panels = [([field], numbers[0]) for field in fields]
+    else:
+        panels = [(list(fields), name) for name in numbers]
+    columns = min(2, len(panels))
+    rows = ceil(len(panels) / columns)
+    with canvas(0.5 + _PANEL_IN[1] * rows, _PANEL_IN[0] * columns if len(panels) > 1 else 4.6) as figure:
+        places = figure.subplots(rows, columns, squeeze=False).ravel()
+        for i, (axes, (over, name)) in enumerate(zip(places, panels, strict=False)):
+            if len(over) == 1:
+                _line(axes, data, over[0], name)
+            else:
+                _map(figure, axes, data, over, name)
+                if i % columns:
+                    axes.set_ylabel("")
+        for axes in places[len(panels) :]:
             axes.set_visible(False)
-        if any(data[name].isnull().any() for _, name in shown):
+        if any(data[name].isnull().any() for _, name in panels):
             figure.supxlabel("×: the run has no such number", fontsize=7.5)
         return save_both(figure, stem)
 
 
-def _line(axes: Axes, data: xr.Dataset, field: str, name: str, *, interval: bool = True) -> None:
-    """Draws a number over a field: every run, and their mean, with its interval if other fields do not vary."""
+def _line(axes: Axes, data: xr.Dataset, field: str, name: str) -> None:
     values = data[name]
     x, ticks = _axis(data[field].values)
     others = [dim for dim in values.dims if dim != data[field].dims[0]]
@@ -70,13 +72,10 @@ def _line(axes: Axes, data: xr.Dataset, field: str, name: str, *, interval: bool
     color = line if on_a_grid else dot
     if y.shape[1] > 1:
         axes.plot(np.repeat(x, y.shape[1]), y.ravel(), ".", color="0.65", markersize=4.0, label="one run")
-        if interval:
-            bars = f"mean, {100 * CONFIDENCE:g} % interval"
-            axes.errorbar(x, mean, half, fmt="none", ecolor=color, elinewidth=1.2, capsize=3.0, label=bars)
-    label = None if interval or y.shape[1] == 1 else "mean"
-    axes.plot(x[order], mean[order], "o-" if on_a_grid else "o", color=color, markersize=3.5, label=label)
-    if y.shape[1] > 1:
+        bars = f"mean, {100 * CONFIDENCE:g} % interval"
+        axes.errorbar(x, mean, half, fmt="none", ecolor=color, elinewidth=1.2, capsize=3.0, label=bars)
         axes.legend(loc="best", fontsize=7.0)
+    axes.plot(x[order], mean[order], "o-" if on_a_grid else "o", color=color, markersize=3.5)
     mark_lost(axes, x[np.isnan(y).any(axis=1)], _FAILED, 0.03)
     _name_axis(axes, "x", data[field], ticks)
     axes.set_ylabel(quantity(values, 30))

@@ -137,7 +137,6 @@ COMMANDS = {
     "calibrate": ["calibrate", "--jobs", "2"],
     "robustness": ["study", "robustness", "--points", "6", "--jobs", "2"],
     "challenge": ["study", "challenge", "--quick", "--jobs", "2"],
-    "gallery": ["study", "gallery", "arenas.png", "-o", "out", "--jobs", "2"],
     "bench": ["study", "bench", "--quick", "--cases", "levels"],
     "uncertainty": ["run", "--uncertainty", "4", "--duration", "100", "--jobs", "2", "--out", "out"],
     "speed": ["study", "speed", "--jobs", "2"],

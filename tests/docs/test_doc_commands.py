@@ -35,6 +35,7 @@ QUICK = {
     ("annelid", "draw"): (),
     ("annelid", "show"): (),
     ("annelid", "list", "runs"): (),
+    ("annelid", "list", "numbers"): (),
     ("annelid", "check"): (),
     ("annelid", "new"): ("--force",),
     ("annelid", "export-network"): ("--force",),

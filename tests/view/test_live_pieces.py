@@ -16,7 +16,7 @@ from annelid.draw.scene import Skeleton
 from annelid.errors import ConfigError, RunFileError
 from annelid.live.living import LivingWorm, Moment, Reel, knobs_of, reel_of
 from annelid.live.panel import MOST_SAMPLES, plots_of
-from annelid.live.picture import REACH_M, Painter, struck
+from annelid.live.picture import REACH_M, Painter, painter_of, struck
 from annelid.live.player import Player, player_of
 from annelid.live.things import triangles
 from annelid.simulation.runfile import Run
@@ -306,10 +306,17 @@ def test_a_ray_is_turned_into_the_axes_of_a_slope() -> None:
         server.stop()
 
 
-def test_planar_worms_are_refused(planar_run: Run) -> None:
-    for source in (planar_run, planar_run.config):
-        with pytest.raises(ConfigError, match="nothing to view in 3D"):
-            player_of(source)
+def test_a_planar_worm_is_seen_from_its_side(planar_run: Run) -> None:
+    player, anatomy = player_of(planar_run)
+    first = player.reel.at(0.0)
+    picture = painter_of(anatomy, planar_run.config, first).paint(first)
+    assert picture.strands.shape == picture.ring_colors.shape == (3 * 4, 2, 3)
+    ends = planar_run.data["stretch_length"].values[0, :, 0].sum() / 2
+    np.testing.assert_allclose(picture.strands[..., 0].min(), -ends, atol=1e-6)
+    assert not picture.strands[..., 1].any()
+    living, _ = player_of(planar_run.config)
+    living.tick(0.05)
+    assert living.reel.span_s[1] >= 0.05
 
 
 def test_names_of_neurons_stay_words_in_the_live_diagram() -> None:

@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.body.worm import worm_of
-from annelid.config import Knob, RunConfig, load_config
+from annelid.config import BodyKind, Knob, RunConfig, load_config
+from annelid.config.kinds import above
 from annelid.draw.scene import postures_of
 from annelid.morphology import Array
-from annelid.protocols import Records
+from annelid.protocols import Plant, Records
 from annelid.simulation.adjust import adjusted
 from annelid.simulation.runfile import Run
-from annelid.simulation.stepping import Simulation, build_controller, start
+from annelid.simulation.stepping import Simulation, build_controller, build_plant, start
 from annelid.simulation.worm import WormPlant
 
 KEEP_BYTES = 200_000_000  # a live view forgets the oldest postures beyond this
@@ -31,7 +31,6 @@ POKE_RADIUS_M = 0.06
 """Distance from the middle of a poke at which its force has fallen to 0.6, as under the flat of a hand."""
 _TRIM_EVERY = 64
 _time_of = attrgetter("time_s")
-_LEAST_FRICTION = 0.01
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,7 +38,7 @@ class Moment:
     """A worm at one instant."""
 
     time_s: float
-    qpos: NDArray[np.floating]  # generalised positions, (nq,)
+    qpos: NDArray[np.floating]  # generalised positions, (nq,), or the outlines of a planar body, m
     activation: NDArray[np.floating]  # of every ring muscle, in [0, 1], (n_muscles,)
     contact_force_N: NDArray[np.floating]  # of the ground on every segment, (n_segments, 3)
 
@@ -93,7 +92,7 @@ class Reel:
 
 
 class LivingWorm:
-    """Body and nervous system of a 3D worm from time zero on, and a reel of what is remembered of them."""
+    """Body and nervous system from time zero on, and a reel of what is remembered of them."""
 
     def __init__(self, config: RunConfig) -> None:
         self._first = self.config = config
@@ -101,7 +100,7 @@ class LivingWorm:
 
     @property
     def plant(self) -> WormPlant:
-        """The body."""
+        """The body of a 3D worm."""
         plant = self.simulation.plant
         assert isinstance(plant, WormPlant)
         return plant
@@ -113,7 +112,7 @@ class LivingWorm:
 
     def restart(self) -> None:
         """Begins anew at time zero under the present configuration, and forgets what was."""
-        plant = WormPlant(self.config)
+        plant = build_plant(self.config)
         controller = build_controller(self.config, plant)
         self.simulation: Simulation = start(_endless(self.config), plant, controller, None)
         self._poke_ends_s = -1.0
@@ -164,8 +163,8 @@ class LivingWorm:
         self._poke_ends_s = self.time_s + POKE_S
 
     def _remember(self) -> None:
-        plant, now = self.plant, self.simulation
-        kept = (plant.qpos, now.activation, now.sensation.contact_force_N)
+        now = self.simulation
+        kept = (_posture(self.config.body, now.plant), now.activation, now.sensation.contact_force_N)
         self.reel.add(Moment(self.time_s, *(array.astype(np.float32) for array in kept)))
         self.reel.forget()
 
@@ -176,14 +175,27 @@ class LivingWorm:
         self._next_sample_s = self.time_s + SAMPLE_S
 
 
+def _posture(body: BodyKind, plant: Plant) -> Array:
+    """Where a body is now, as a `Moment` has it."""
+    if isinstance(plant, WormPlant):
+        return plant.qpos
+    assert isinstance(plant, Records)
+    return body.outlines({**plant.read(False), **plant.read(True)})
+
+
 def signal_names(neurons: Iterable[str], n_muscles: int) -> tuple[str, ...]:
     """Names of a reel's signals."""
     return (*neurons, *(f"activation_{muscle + 1}" for muscle in range(n_muscles)))
 
 
-def reel_of(run: Run, n_coordinates: int) -> Reel:
-    """Returns the moments and signals that a run of a 3D worm, a body of so many coordinates, has recorded."""
-    data, qpos = run.data, postures_of(run, n_coordinates)
+def reel_of(run: Run, n_coordinates: int | None) -> Reel:
+    """Returns the moments and signals that a run has recorded, of a 3D worm of so many coordinates or a planar body."""
+    data = run.data
+    if n_coordinates is None:
+        recorded = {str(name): signal.values for name, signal in data.items()}
+        postures, moments = run.config.body.outlines(recorded), data["time"].values
+    else:
+        postures, moments = postures_of(run, n_coordinates), data["frame_time"].values
     neurons = [str(name) for name in data["neuron"].values] if "potential" in data else []
     activation = data["activation"].values
     reel = Reel(signal_names(neurons, activation.shape[1]))
@@ -191,52 +203,28 @@ def reel_of(run: Run, n_coordinates: int) -> Reel:
     signals = np.concatenate([data["potential"].values, activation], axis=1) if neurons else activation
     for time, values in zip(times, signals, strict=True):
         reel.add_sample(float(time), values)
-    frame_times = data["frame_time"].values
-    sample = np.clip(np.searchsorted(times, frame_times + 1e-9, side="right") - 1, 0, None)
-    force = data["contact_force"].values
-    for frame, time in enumerate(frame_times):
-        reel.add(Moment(float(time), qpos[frame], activation[sample[frame]], force[sample[frame]]))
+    sample = np.clip(np.searchsorted(times, moments + 1e-9, side="right") - 1, 0, None)
+    force = (
+        data["contact_force"].values if "contact_force" in data else np.zeros((len(times), data.sizes["segment"], 3))
+    )
+    for number, time in enumerate(moments):
+        reel.add(Moment(float(time), postures[number], activation[sample[number]], force[sample[number]]))
     return reel
 
 
 def knobs_of(config: RunConfig) -> tuple[Knob, ...]:
-    """Returns what can be turned of a 3D worm; sensors and drive only where its controller uses them."""
-    body, arena, controller, sensor = worm_of(config), config.arena, config.controller, config.sensor
-    assert arena is not None
-    friction, strands, springs = "arena.friction", "body.strands.young_modulus_Pa", "body.springs.stiffness_N_per_m"
-    sliding = f"Sliding friction of skin and ground ({'forwards' if arena.has_setae else 'any direction'}). "
-    rebuilt = "The body is rebuilt and goes on where it is."
-    bending = f"Young's modulus of the strands, which resists bending. {rebuilt}"
-    axial = f"Stiffness of the axial springs. {rebuilt}"
-    most = _above(arena.friction, 2.0)
-    knobs = [
-        Knob(friction, "friction", 1.0, _LEAST_FRICTION, most, 0.01, sliding + "Takes effect in the next step."),
-    ]
-    # A slider has one number, for all segments.
-    if isinstance(modulus_Pa := body.strands.young_modulus_Pa, float):
-        gpa = 1e-9 * modulus_Pa
-        knobs.append(Knob(strands, "strands (GPa)", 1e-9, _round(gpa / 4), _round(4 * gpa), _round(gpa / 40), bending))
-    if isinstance(rate := body.springs.stiffness_N_per_m, float):
-        knobs.append(Knob(springs, "springs (N/m)", 1.0, 0.0, _round(4 * rate) or 100.0, 0.1, axial))
+    """Returns what can be turned while a worm runs; sensors only where its controller uses them."""
+    body, arena, controller, sensor = config.body, config.arena, config.controller, config.sensor
+    knobs = [*(() if arena is None else arena.knobs()), *body.knobs()]
     if "tolerance_m" in controller.sensor_fields:
-        most = _above(1e3 * sensor.tolerance_m, 40.0)
+        most = above(1e3 * sensor.tolerance_m, 40.0)
         near = "A stretch sensor is on while its segment is within this of its rest length."
         knobs.append(Knob("sensor.tolerance_m", "sensor tolerance (mm)", 1e3, 0.0, most, 0.5, near))
     if "noise_m" in controller.sensor_fields:
-        most = _above(1e3 * sensor.noise_m, 10.0)
+        most = above(1e3 * sensor.noise_m, 10.0)
         noise = "Standard deviation of the noise on every reading of a stretch sensor."
         knobs.append(Knob("sensor.noise_m", "sensor noise (mm)", 1e3, 0.0, most, 0.1, noise))
     return (*knobs, *controller.knobs())
-
-
-def _above(value: float, usual: float) -> float:
-    """The usual upper end of a range, or one well above a value beyond it."""
-    return usual if value <= usual else _round(2.0 * value)
-
-
-def _round(value: float) -> float:
-    """Two digits of a number, so that sliders end at round ones."""
-    return float(f"{value:.2g}")
 
 
 def _endless(config: RunConfig) -> RunConfig:

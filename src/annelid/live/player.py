@@ -105,26 +105,26 @@ class Player:
 
 
 def config_of(source: RunConfig | Run) -> RunConfig:
-    """Returns the configuration that a worm is run under, or was; refuses a planar worm."""
+    """Returns the configuration that a worm is run under, or was; refuses a robot that a file describes."""
     config = source.config if isinstance(source, Run) else source
-    if config.body.geometry() is None:
+    if config.body.geometry() is None and not config.body.is_planar:
         raise ConfigError(
-            f"body.kind = {config.body.kind!r} has nothing to view in 3D; only the 3D worm (body.kind = 'worm') has: "
-            "use annelid run and annelid draw"
+            f"body.kind = {config.body.kind!r} cannot be viewed, as the 3D worm (body.kind = 'worm') and planar bodies "
+            "can: use annelid run and annelid draw"
         )
     return config
 
 
-def player_of(source: RunConfig | Run, speed: float = 1.0) -> tuple[Player, Anatomy]:
-    """Returns the player of a configuration, which is run, or of a run, and the body that is seen.
+def player_of(source: RunConfig | Run, speed: float = 1.0) -> tuple[Player, Anatomy | None]:
+    """Returns the player of a configuration, which is run, or of a run, and the compiled body of a 3D worm.
 
     Raises:
-        ConfigError: The body is planar, or cannot be built.
+        ConfigError: The body cannot be viewed, or not be built.
         RunFileError: The run holds no postures.
     """
     config = config_of(source)
     if isinstance(source, Run):
-        anatomy = compile_worm(config)
-        return Player(reel_of(source, anatomy.model.nq), speed), anatomy
+        anatomy = None if config.body.is_planar else compile_worm(config)
+        return Player(reel_of(source, None if anatomy is None else anatomy.model.nq), speed), anatomy
     worm = LivingWorm(config)
-    return Player(worm, speed), worm.plant.anatomy
+    return Player(worm, speed), None if config.body.is_planar else worm.plant.anatomy

@@ -21,7 +21,6 @@ from annelid.config import (
     preset_names,
     preset_text,
 )
-from annelid.config.sections import Section
 from annelid.errors import ConfigError
 from annelid_studies.planar.sections import PlanarWorm
 
@@ -143,25 +142,6 @@ def test_every_field_has_a_description() -> None:
     assert undescribed == []
 
 
-def test_sections_are_immutable() -> None:
-    config = load_config("riddle2023")
-    with pytest.raises(ValueError, match="frozen"):
-        config.seed = 3  # type: ignore[misc]
-    assert issubclass(RunConfig, Section)
-
-
-def test_overrides_go_to_their_field_and_nowhere_else() -> None:
-    plain = load_config("riddle2023-rods")
-    changed = load_config("riddle2023-rods", parse_assignments(["body.mesh.n_segments=6", "arena.friction = 0.3"]))
-    assert isinstance(changed.body, WormBody)
-    assert isinstance(plain.body, WormBody)
-    assert changed.body.mesh.n_segments == 6
-    assert changed.arena is not None
-    assert changed.arena.friction == 0.3
-    assert changed.body.strands == plain.body.strands
-    assert changed.controller == plain.controller
-
-
 def test_changing_a_kind_starts_from_that_kind_s_defaults() -> None:
     changed = load_config(
         "riddle2023",
@@ -169,15 +149,6 @@ def test_changing_a_kind_starts_from_that_kind_s_defaults() -> None:
     )
     assert isinstance(changed.body, WormBody)
     assert changed.body.formulation.kind == "rods"
-
-
-def test_a_file_may_start_from_a_preset(tmp_path: Path) -> None:
-    file = tmp_path / "slippery.toml"
-    file.write_text('extends = "riddle2023-rods"\n[arena]\nfriction = 0.1\n', encoding="utf-8")
-    config = load_config(file)
-    assert config.arena is not None
-    assert (config.arena.friction, config.name) == (0.1, "slippery")
-    assert config.clock == load_config("riddle2023-rods").clock
 
 
 def test_a_file_that_names_no_base_starts_from_the_rod_worm(tmp_path: Path) -> None:
@@ -208,15 +179,11 @@ def test_a_bad_value_is_named_with_what_would_be_valid(subtests: pytest.Subtests
     for assignment, sentence in (
         ("body.mesh.n_helices=7", "body.mesh.n_helices = 7: .* even"),
         ("body.mesh.n_helices=4", "body.mesh.n_helices = 4: must be at least 6"),
-        ("body.mesh.n_segments=2", "body.mesh.n_segments = 2: must be at least 3"),
         ("body.mesh.n_segments=3.5", "must be a whole number"),
-        ("body.mesh.radius_m=0", "body.mesh.radius_m = 0: must be at least 1e-06"),
-        ("body.strands.radius_m=-0.001", "must be at least 1e-06"),
         ("arena.friction=-1", "arena.friction = -1: must be at least 0"),
         ("arena.friction=inf", "must be a finite number"),
         ("duration_s=0", "duration_s = 0: must be greater than 0"),
         ("clock.physics_timestep_s=0.0033", "integer multiple"),
-        ("clock.physics_timestep_s=0.001001", "integer multiple"),
         ("record.frames_interval_s=0.0405", "record.frames_interval_s = 0.0405 must be an integer multiple"),
         ("duration_s=1.0005", "duration_s = 1.0005 must be an integer multiple"),
         ("record.signals_interval_s=0.0015", "record.signals_interval_s = 0.0015 must be an integer multiple"),
@@ -225,19 +192,14 @@ def test_a_bad_value_is_named_with_what_would_be_valid(subtests: pytest.Subtests
         ("body.formulation.joint=ball", "is no field any more: a chain's elements are always joined by three hinges"),
         ("body.mesh.segments=4", "unknown field 'body.mesh.segments': did you mean 'n_segments'"),
         ("friction=1", "did you mean 'arena.friction'"),
-        ("body.formulation.pin_time_s=9", "did you mean 'pin_time_constant_s'"),
         ("body.rings.length_range_m=[1.0, 0.5]", "lower bound below its upper bound"),
         ("body.rings.length_range_m=[[0.5, 1.0], [0.5, 1.0]]", "2 ranges for 3 segments"),
         ("body=3", "is a section"),
         ("body.mesh.n_segments=100000", "must be at most 200"),
         ("duration_s=1e9", "more than 10,000,000 samples"),
-        ("clock.control_timestep_s=1e-320", "must be at least 1e-06"),
-        ("clock.physics_timestep_s=2", "must be at most 1"),
         ("body.rings.length_range_m=[]", "one pair"),
         ("body.strands.radius_m=0.5", "must be less than body.mesh.radius_m = 0.16"),
         ("arena.contact_impedance=[1, 2, 3]", "must be less than 1"),
-        ("arena.floor_gap_m=-0.1", "must be at least 0"),
-        ("arena.friction=0", "must be at least 0.01"),
     ):
         with subtests.test(f"{assignment!r:.60}"):
             with pytest.raises(ConfigError, match=sentence) as caught:
@@ -259,12 +221,6 @@ def test_planar_worms_have_no_ground() -> None:
 def test_planar_heights_must_fit_the_rhombus(heights: str) -> None:
     with pytest.raises(ConfigError, match="height_min_m < height_max_m < 2 side_m"):
         load_config("riddle2022-planar", parse_assignments([heights]))
-
-
-def test_an_unknown_preset_suggests_the_nearest() -> None:
-    for typed in ("ridle2023", "riddle2032"):
-        with pytest.raises(ConfigError, match="did you mean 'riddle2023'"):
-            load_config(typed)
 
 
 def test_an_assignment_needs_a_field_and_a_value(subtests: pytest.Subtests) -> None:

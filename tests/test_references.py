@@ -58,18 +58,8 @@ def test_every_preset_cites_its_controller_and_what_computes_it(subtests: pytest
             assert ("todorov2012" in keys) != isinstance(config.body, PlanarWorm)
 
 
-def test_every_kind_of_controller_adds_its_own(subtests: pytest.Subtests) -> None:
-    for kind in CONTROLLERS:
-        with subtests.test(f"{kind!r:.60}"):
-            assert CONTROLLERS[kind] <= cited("riddle2023-rods", {"controller.kind": kind})
-
-
 def test_the_kinds_of_controllers_above_are_all_that_there_are() -> None:
     assert {*CONTROLLERS, "program"} == set(kinds_of(ControllerKind))
-
-
-def test_a_sine_wave_cites_no_network() -> None:
-    assert not {"riddle2022", "szczecinski2017", "nourse2023"} & cited("riddle2023-rods", {"controller.kind": "sine"})
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from typing import Any
 from annelid.errors import RunFileError
 from annelid.text import printable
 
-__all__ = ["whole_file", "with_suffix", "write_csv", "write_json", "write_text"]
+__all__ = ["plain_cell", "whole_file", "with_suffix", "write_csv", "write_json", "write_text"]
 
 
 @contextmanager
@@ -58,12 +58,13 @@ def write_csv(path: Path, columns: Iterable[str], rows: Iterable[Iterable[object
     """
     with whole_file(path) as draft, draft.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow([_cell(column) for column in columns])
-        writer.writerows([_cell(value) if isinstance(value, str) else value for value in row] for row in rows)
+        writer.writerow([plain_cell(column) for column in columns])
+        writer.writerows([plain_cell(value) if isinstance(value, str) else value for value in row] for row in rows)
     return path
 
 
-def _cell(text: str) -> str:
+def plain_cell(text: str) -> str:
+    """Returns text as a cell of a table, with a leading apostrophe where a spreadsheet would take it for a formula."""
     text = printable(text)
     if text[:1] not in tuple("=+-@\t"):
         return text

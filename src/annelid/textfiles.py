@@ -32,20 +32,9 @@ MOST_BYTES = 8_000_000
 MOST_LEVELS = 64
 """Tables and lists within each other, and parts of a dotted key."""
 
-# The parser takes time that grows with the square of a key's parts, so long keys are found before it sees them. What is
-# no key is left out as the parser reads it: a text in three quotes may end in five. One that is not closed ends with
-# its line, or with the text: nothing is tried twice, which would take time that grows with the square of its length.
-_NOT_KEYS = re.compile(
-    r"""
-    "{3} (?: [^"\\]++ | \\.?+ | "(?!"") )*+ (?: "{3,5} )?
-    | '{3} .*? (?: '{3,5} | \Z )
-    | " (?: [^"\\\n]++ | \\.?+ )*+ "?
-    | ' [^'\n]*+ '?
-    | \# [^\n]*+
-    """,
-    re.DOTALL | re.VERBOSE,
-)
-_LONG_KEY = re.compile(rf"(?<![\w-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{MOST_LEVELS}}}")
+# The parser takes time that grows with the square of a key's parts, so long keys are found before it sees them. As many
+# words and dots in a text that is no key are refused, too.
+_KEY_PARTS = re.compile(r"""(?<![\w\\-])(?:(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+)++""")
 
 
 def read_text(path: Path, what: str = "") -> str:
@@ -93,7 +82,7 @@ def read_json(path: Path, what: str = "") -> Any:
 
 def parse_toml(text: str, name: str) -> dict[str, Any]:
     """Reads TOML that an `UnreadableText` calls by a name where it is not valid, too long or too deep."""
-    if _has_long_key(_bounded(text, name, len(text))):
+    if any(parts[0].count(".") >= MOST_LEVELS for parts in _KEY_PARTS.finditer(_bounded(text, name, len(text)))):
         raise _too_deep(name)
     return _parsed(tomllib.loads, "TOML", text, name)
 
@@ -207,10 +196,6 @@ def _plain(value: Any) -> Any:
         return [_plain(item) for item in value]
     # numpy's numbers among them.
     return float(value) if isinstance(value, Real) and not isinstance(value, int | float) else value
-
-
-def _has_long_key(text: str) -> bool:
-    return _LONG_KEY.search(_NOT_KEYS.sub("_", text)) is not None
 
 
 def _bounded(text: str, name: str, size: int) -> str:

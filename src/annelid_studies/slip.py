@@ -9,19 +9,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import astuple, fields
-from math import nan
+from math import inf, nan
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from rich.table import Table as TerminalTable
 
-from annelid.analysis import Estimate, mean_and_interval, slip_cost
+from annelid.analysis import Estimate, forward_position, gait, mean_and_interval
 from annelid.config import load_config
 from annelid.draw import canvas, draw_lines, panel_title, save_both
 from annelid.experiment import Case, Store, finer_steps
 from annelid.markdown import Table
 from annelid.output import write_csv
+from annelid.simulation import Run
 from annelid_studies.slip_detector import Detection, DetectionScore, detect_slip, precision_recall, score_detections
 from annelid_studies.tables import terminal_table
 from annelid_studies.worms import Effort, drawn_frictions
@@ -90,7 +91,7 @@ def slip_feedback(store: Store, effort: Effort, *, half_step: bool = False) -> l
         for controller in CONTROLLERS
     }
     store.compute([one for own in cases.values() for one in own], "feedback")
-    numbers = {at: np.array([_speed_and_loss(store, one) for one in own]) for at, own in cases.items()}
+    numbers = {at: np.array([speed_and_loss(store.run(one)) for one in own]) for at, own in cases.items()}
     readings = []
     for at, own in cases.items():
         speed, loss = numbers[at].T
@@ -101,9 +102,19 @@ def slip_feedback(store: Store, effort: Effort, *, half_step: bool = False) -> l
     return readings
 
 
-def _speed_and_loss(store: Store, one: Case) -> tuple[float, float]:
-    cost = slip_cost(store.run(one))
-    return (nan, nan) if cost is None else (cost.speed_m_per_s, cost.loss_J_per_m)
+def speed_and_loss(run: Run) -> tuple[float, float]:
+    """Returns the speed along the initial heading, m/s, and what was lost to friction on the way, J/m.
+
+    Over complete cycles behind the first contraction of segment 1; NaN without any, and an infinite loss for a worm
+    that got nowhere or backwards.
+    """
+    cycles = gait(run)
+    if cycles.start_s is None or cycles.end_s is None:
+        return nan, nan
+    time, loss = run.data["time"].values, run.data["slip_loss"].values.sum(axis=1)
+    ends = np.searchsorted(time, [cycles.start_s, cycles.end_s])
+    duration, travel, lost = (float(np.diff(each[ends])[0]) for each in (time, forward_position(run), loss))
+    return travel / duration, lost / travel if travel > 0.0 else inf
 
 
 def write_readings(readings: Sequence[Reading], path: Path) -> Path:

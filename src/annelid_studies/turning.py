@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 from rich.table import Table as TerminalTable
 
-from annelid.analysis import Track, track_of, turn_of
+from annelid.analysis import Track, track_of
 from annelid.draw import canvas, draw_lines, line_looks, panel_title, save_both
+from annelid.errors import RunFileError
 from annelid.experiment import Case, Store
 from annelid_studies.tables import grouped, tabulated, terminal_table
 
@@ -22,6 +23,57 @@ MODULATIONS = (-0.9, -0.6, -0.3, 0.0, 0.3, 0.6, 0.9)
 QUICK = (-0.9, 0.9)
 LARGEST_RADIUS_M = 20.0
 """Where the axis of the radius ends: a worm that turns more weakly than this goes straight."""
+
+
+@dataclass(frozen=True, slots=True)
+class Turn:
+    """How a worm turned over complete cycles.
+
+    Attributes:
+        cycles: Complete cycles between the two ends.
+        angle_rad: Change of the heading, positive to the left.
+        path_m: Length of the path of the middle of the body, from cycle to cycle.
+        curvature_per_m: Angle over path; positive to the left.
+    """
+
+    cycles: int
+    angle_rad: float
+    path_m: float
+    curvature_per_m: float
+
+    @property
+    def radius_m(self) -> float:
+        """Radius of the circle, m; infinite for a straight path, NaN for one of no length."""
+        return np.inf if self.curvature_per_m == 0 else abs(1.0 / self.curvature_per_m)
+
+
+def turn_of(track: Track, period_s: float, after_s: float = 0.0) -> Turn:
+    """Measures the turn over as many complete cycles as there are.
+
+    Samples a cycle apart are compared, so that the swings within a cycle do not count; angle and path are means over
+    every phase of the cycle.
+
+    Args:
+        track: The track.
+        period_s: Time of a cycle, s.
+        after_s: Time from which on it is measured, so that the start is left out, s.
+
+    Raises:
+        RunFileError: Less than two complete cycles behind ``after_s``.
+    """
+    first, last = max(after_s, float(track.time_s[0])), float(track.time_s[-1])
+    # The last complete cycle serves to average over its phases.
+    hops = int((last - first) / period_s + 1e-9) - 1 if period_s > 0 else 0
+    if hops < 1:
+        raise RunFileError(
+            f"a turn takes at least two cycles of {period_s:g} s, not the {last - first:.4g} s from {first:.4g} s on"
+        )
+    phases = np.linspace(0.0, period_s, 64, endpoint=False)
+    times = first + phases[:, np.newaxis] + period_s * np.arange(hops + 1)
+    x, y, heading = (np.interp(times, track.time_s, values) for values in (*track.middle_m.T, track.heading_rad))
+    path = float(np.hypot(np.diff(x, axis=1), np.diff(y, axis=1)).sum(axis=1).mean())
+    angle = float((heading[:, -1] - heading[:, 0]).mean())
+    return Turn(hops, angle, path, angle / path if path > 0 else float("nan"))
 
 
 @dataclass(frozen=True)

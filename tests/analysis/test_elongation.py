@@ -29,9 +29,3 @@ def test_interior_deficit_knows_neither_unit_nor_direction(lengths: list[float],
     deficit = interior_deficit(lengths)
     assert interior_deficit([scale * length for length in lengths]) == pytest.approx(deficit, abs=1e-9)
     assert interior_deficit(lengths[::-1]) == pytest.approx(deficit, abs=1e-9)
-
-
-def test_interior_deficit_is_that_of_the_means() -> None:
-    assert interior_deficit([0.05, 0.03, 0.04, 0.06]) == pytest.approx(1 - 3.5 / 5.5)
-    assert interior_deficit([0.05, 0.02, 0.05]) == pytest.approx(middle_deficit([0.05, 0.02, 0.05]))
-    assert math.isnan(interior_deficit([0.0, 0.01, 0.0]))

@@ -5,17 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from annelid.analysis.rhythm import contractions, full_cycles, is_wave, rhythm, segment_activation
+from annelid.analysis.rhythm import full_cycles, is_wave, rhythm, score
 from synthetic import wave_activation
-
-
-def test_onset_is_interpolated_between_samples() -> None:
-    # From 0.2 to 0.8 within a second: half way at 1.5 s.
-    assert contractions([0.0, 1.0, 2.0, 3.0], [0.0, 0.2, 0.8, 0.1])[:, 0] == pytest.approx([1.5])
-
-
-def test_contracted_at_the_first_sample_counts_as_an_onset_there() -> None:
-    assert contractions([0.0, 1.0, 2.0, 3.0], [0.9, 0.1, 0.1, 0.9])[:, 0] == pytest.approx([0.0, 2.5])
 
 
 @given(
@@ -32,7 +23,10 @@ def test_a_shifted_and_scaled_wave_gives_its_period_order_and_cycles(
     end_s = start_s + cycles * period_s - 0.5 * share_s
     time = np.arange(0.0, end_s, interval_s)
     activation = wave_activation(time, n_segments, period_s, start_s, rise_s=0.02)
-    found = rhythm(time, activation)
+    found, scored = rhythm(time, activation), score(time, activation)
+    assert (scored.verdict, scored.direction, scored.wave_fronts) == ("ordered", 1, 1)
+    assert (list(scored.order), scored.period_s) == (found.order, found.period_s)
+    assert scored.regularity == pytest.approx(1.0, abs=1e-6)
     onsets = start_s + share_s * np.arange(cycles * n_segments)
     assert found.order == list(range(1, n_segments + 1)) * cycles
     np.testing.assert_allclose(found.onsets_s, onsets, atol=1e-9)
@@ -93,8 +87,3 @@ def test_wave_and_cycles_of_an_order(subtests: pytest.Subtests) -> None:
         with subtests.test(f"{order!r:.60}"):
             assert is_wave(order, 3) is wave
             assert full_cycles(order, 3) == cycles
-
-
-def test_half_rings_average_to_their_segment() -> None:
-    halves = np.array([[1.0, 0.0, 0.2, 0.4, 1.0, 1.0]])
-    np.testing.assert_allclose(segment_activation(halves, 3), [[0.5, 0.3, 1.0]])

@@ -10,12 +10,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from annelid.analysis.track import Track, track_of, turn_of
+from annelid.analysis.track import Track, track_of
 from annelid.body.mesh import Mesh
 from annelid.body.worm import WormBody
 from annelid.config import load_config
 from annelid.errors import RunFileError
 from annelid.simulation import simulate
+from annelid_studies.turning import turn_of
 
 MESH = Mesh(n_segments=6, planes_between_rings=3, free_planes_at_ends=2)
 GEOMETRY = MESH.geometry()

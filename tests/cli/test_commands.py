@@ -89,14 +89,6 @@ def test_a_missing_back_end_costs_the_pictures_and_not_the_run(
     assert "no OpenGL back-end works here" in done.sentence()
 
 
-def test_show_json_is_json_and_nothing_else(annelid: Command, finished: Path) -> None:
-    read = json.loads(annelid("show", finished, "--json").out)
-    assert read["name"] == "riddle2022-planar"
-    assert read["order"][0] == 1
-    assert len(read["order"]) == len(read["onsets_s"])
-    assert read["travel_m"] is None
-
-
 def test_plot_and_render_write_where_they_are_told(annelid: Command, finished: Path) -> None:
     assert annelid("draw", finished, "-o", "f.svg").exit_code == 0
     assert Path("f.svg").read_text().lstrip().startswith("<?xml")
@@ -111,10 +103,9 @@ def test_plot_and_render_write_where_they_are_told(annelid: Command, finished: P
 def test_render_takes_a_background_and_refuses_a_strip_of_a_planar_worm(annelid: Command, finished: Path) -> None:
     import imageio.v3
 
-    for name, corner in (("dark", [20, 22, 26]), ("white", [255, 255, 255])):
-        done = annelid("draw", finished, "--time", "0.5", "-o", f"{name}.png", "--background", name)
-        assert done.exit_code == 0, done.err
-        assert imageio.v3.imread(f"{name}.png")[0, 0, :3].tolist() == corner
+    done = annelid("draw", finished, "--time", "0.5", "-o", "dark.png", "--background", "dark")
+    assert done.exit_code == 0, done.err
+    assert imageio.v3.imread("dark.png")[0, 0, :3].tolist() == [20, 22, 26]
     done = annelid("draw", finished, "--strip", "s.pdf")
     assert done.exit_code == 2
     assert "planar" in done.err
@@ -136,18 +127,6 @@ def test_a_network_file_is_exported_and_kept_without_force(annelid: Command) -> 
     assert annelid(*words, "--force").exit_code == 0
     assert "has no effect on a network" in annelid("export-network", "network.toml", "--segments", "4").err
     assert "has no effect on a controller" in annelid("export-network", "riddle2022-planar", "--scheme", "heun").err
-
-
-def test_build_writes_what_plain_mujoco_loads_and_steps(annelid: Command) -> None:
-    import numpy as np
-
-    done = annelid("export", "--to", "mjcf", "riddle2023-rods", "-o", "worm.xml", "--segments", "4")
-    assert done.exit_code == 0, done.err
-    model = mujoco.MjModel.from_xml_path("worm.xml")
-    assert model.nu == 4
-    data = mujoco.MjData(model)
-    mujoco.mj_step(model, data, 3)
-    assert np.all(np.isfinite(data.qpos))
 
 
 @pytest.mark.usefixtures("undrawn")
@@ -188,12 +167,6 @@ def test_presets_lists_prints_and_explains(annelid: Command) -> None:
     assert "body.mesh" not in fields
     meaning = field_paths()["arena.friction"]
     assert meaning in annelid("list", "presets", "--fields").out
-
-
-def test_doctor_ends_well(annelid: Command) -> None:
-    done = annelid("doctor")
-    assert done.exit_code == 0
-    assert any(line.split()[:2] == ["ok", "mujoco"] for line in done.out.splitlines())
 
 
 def test_every_command_teaches_by_example(annelid: Command) -> None:
@@ -261,13 +234,10 @@ def test_the_shell_completes_options_presets_arenas_and_runs(tmp_path: Path, fin
         assert offers in done.stdout.split(), done.stderr
 
 
-def test_help_and_version_come_from_the_module_as_well() -> None:
-    for option, says in (("--help", "annelid run"), ("--version", "annelid 0.")):
-        done = subprocess.run(
-            [sys.executable, "-m", "annelid", option], capture_output=True, text=True, check=False, timeout=120
-        )
-        assert done.returncode == 0
-        assert says in done.stdout
+def test_the_version_comes_from_the_module_as_well() -> None:
+    line = [sys.executable, "-m", "annelid", "--version"]
+    done = subprocess.run(line, capture_output=True, text=True, check=True, timeout=120)
+    assert done.stdout.startswith("annelid 0.")
 
 
 @pytest.mark.usefixtures("undrawn")

@@ -112,11 +112,6 @@ def test_cite_takes_a_run_a_preset_or_a_file(annelid: Command, run: Path) -> Non
         assert "todorov2012" not in done.out
 
 
-def test_cite_alone_names_the_tool_and_the_paper(annelid: Command) -> None:
-    assert annelid("cite").out.count("\n@") == 2
-    assert annelid("cite", "--all").out.count("@") > 10
-
-
 @pytest.mark.parametrize(
     ("source", "words"), [("wangg", "did you mean 'wang'"), (".", "holds no run.nc"), ("no.toml", "no.toml")]
 )

@@ -107,16 +107,6 @@ def test_a_runs_own_pictures_are_drawn_anew_unless_they_are_named(
     assert own.stat().st_size > 1000
 
 
-def test_a_name_without_suffix_does_not_replace_the_png(annelid: Command, finished: Path) -> None:
-    Path("mine.png").write_text("mine")
-    done = annelid("draw", finished, "-o", "mine")
-    assert done.exit_code == 2
-    assert "mine.png exists" in done.sentence()
-    assert Path("mine.png").read_text() == "mine"
-    assert annelid("draw", finished, "-o", "other").out.split() == ["other.png"]
-    assert [path.name for path in Path().iterdir() if path.name.startswith("other")] == ["other.png"]
-
-
 def test_plot_writes_three_formats_only(subtests: pytest.Subtests, annelid: Command, finished: Path) -> None:
     for name in ("a.xyz", "a.jpg", ""):
         with subtests.test(f"{name!r:.60}"):
@@ -153,13 +143,6 @@ def test_a_last_resort_is_a_sentence(
     assert done.exit_code == 2
     assert says in done.sentence()
     assert not Path("runs").exists()
-
-
-def test_a_time_that_was_not_recorded_is_refused(annelid: Command, finished: Path) -> None:
-    done = annelid("draw", finished, "--time", "7", "-o", "late.png")
-    assert done.exit_code == 2
-    assert "recorded from 0 to 1 s" in done.sentence()
-    assert not Path("late.png").exists()
 
 
 def test_a_back_end_that_the_engine_does_not_know_is_a_sentence(tmp_path: Path) -> None:

@@ -66,7 +66,7 @@ def test_a_worm_is_exported_as_one_page(tmp_path: Path) -> None:
 
 def test_without_viser_the_line_that_installs_it_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "viser", None)
-    for name in ("guard", "server", "show", "page"):
+    for name in ("server", "show", "page"):
         monkeypatch.delitem(sys.modules, f"annelid.live.{name}", raising=False)
     assert "pip install 'annelid[view]'" in refusal("--no-open")
 

@@ -7,19 +7,17 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
-import h5py
 import numpy as np
 import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.io import savemat
 
 from annelid.config import load_config
-from annelid.errors import AnnelidError, ConfigError, UnreadableText
+from annelid.errors import AnnelidError, ConfigError
 from annelid.simulation.runfile import Run
+from annelid_lab.logs import LogMap, read_map, read_measured
 from annelid_lab.logs.agreement import Agreement, compare_with_log, period, run_series
-from annelid_lab.logs.measured import LogMap, read_map, read_measured
 from annelid_lab.logs.report import agreement_table
 from synthetic import wave_data
 
@@ -231,100 +229,6 @@ def test_a_wrong_last_time_is_refused_before_memory_is_filled(run: Run, tmp_path
         agreement_of(run, log, tmp_path)
 
 
-def semicolons(log: pd.DataFrame, folder: Path) -> Path:
-    log.to_csv(folder / "log.txt", index=False, sep=";", decimal=",", encoding="utf-8-sig")
-    return folder / "log.txt"
-
-
-def tabs(log: pd.DataFrame, folder: Path) -> Path:
-    written = folder / "log.tsv"
-    written.write_text("# made by a logger\n" + log.to_csv(index=False, sep="\t"))
-    return written
-
-
-def parquet(log: pd.DataFrame, folder: Path) -> Path:
-    log.to_parquet(folder / "log.parquet")
-    return folder / "log.parquet"
-
-
-def matlab(log: pd.DataFrame, folder: Path) -> Path:
-    savemat(folder / "log.mat", {name: log[name].to_numpy() for name in log} | {"rig": "A", "gain": 2.0})
-    return folder / "log.mat"
-
-
-def netcdf(log: pd.DataFrame, folder: Path) -> Path:
-    log.set_index("t_ms").to_xarray().to_netcdf(folder / "log.nc", engine="h5netcdf")
-    return folder / "log.nc"
-
-
-@pytest.mark.parametrize("write", [semicolons, tabs, parquet, matlab, netcdf])
-def test_every_format_gives_the_same(run: Run, tmp_path: Path, write: Callable[[pd.DataFrame, Path], Path]) -> None:
-    log = log_of(run).drop(columns="ring (mm)")
-    signals = {name: SIGNALS[name] for name in ("s1_mm", "s3_mm")}
-    found = compared(run, write(log, tmp_path), map=signals)
-    assert found.lag_s == pytest.approx(LAG_S, abs=0.021)
-    assert all(one.rms < 0.02 * one.amplitude[1] for one in found.signals.values())
-
-
-def points(run: Run) -> dict[str, np.ndarray]:
-    """Places of two points in pixels of half a millimetre, 25 a second; their distance is segment 1's length."""
-    time, length, _ = run_series(run, SIGNALS["s1_mm"])
-    frames = np.arange(0.0, 17.0, 0.04)
-    apart = 2e3 * np.interp(frames + LAG_S, time, length)
-    return {
-        "front": np.stack([400 - 0.6 * apart, 300 + 0.8 * apart], axis=1),
-        "rear": np.tile([400.0, 300.0], (len(frames), 1)),
-    }
-
-
-def deeplabcut(run: Run, folder: Path) -> Path:
-    parts = points(run)
-    rows: list[list[object]] = [
-        ["scorer", *["net"] * 6],
-        ["bodyparts", *["front"] * 3, *["rear"] * 3],
-        ["coords", *["x", "y", "likelihood"] * 2],
-    ]
-    for frame in range(len(parts["front"])):
-        lost = frame in (50, 51)
-        cells = [[*(place[frame] + (900.0 if lost else 0.0)), 0.1 if lost else 0.99] for place in parts.values()]
-        rows.append([frame, *cells[0], *cells[1]])
-    (folder / "video.csv").write_text("\n".join(",".join(map(str, row)) for row in rows))
-    return folder / "video.csv"
-
-
-def sleap_table(run: Run, folder: Path) -> Path:
-    parts = points(run)
-    table = pd.DataFrame(
-        {f"{name}.{axis}": place[:, i] for name, place in parts.items() for i, axis in enumerate("xy")}
-    )
-    table = table.assign(track="", frame_idx=table.index, **{"front.score": 0.9, "rear.score": 0.9}).drop(
-        index=range(60, 63)
-    )
-    table.to_csv(folder / "sleap.csv", index=False)
-    return folder / "sleap.csv"
-
-
-def sleap_analysis(run: Run, folder: Path) -> Path:
-    parts = points(run)
-    with h5py.File(folder / "sleap.h5", "w") as file:
-        file["tracks"] = np.stack([place.T for place in parts.values()], axis=1)[None]
-        file["node_names"] = [name.encode() for name in parts]
-    return folder / "sleap.h5"
-
-
-@pytest.mark.parametrize("write", [deeplabcut, sleap_table, sleap_analysis])
-def test_tracked_points_give_distances(run: Run, tmp_path: Path, write: Callable[[Run, Path], Path]) -> None:
-    column = {"signal": SIGNALS["s1_mm"], "distance_to": "rear"}
-    given_map = {"rate_Hz": 25.0, "time": None, "m_per_px": 5e-4, "map": {"front": column}}
-    found = compared(run, write(run, tmp_path), **given_map)
-    assert found.signals["front"].rms < 0.001
-    assert found.lag_s == pytest.approx(LAG_S, abs=0.03)
-    with pytest.raises(ConfigError, match="needs m_per_px"):
-        compared(run, write(run, tmp_path), **(given_map | {"m_per_px": None}))
-    with pytest.raises(ConfigError, match="no column 'tail'"):
-        compared(run, write(run, tmp_path), **(given_map | {"map": {"front": column | {"distance_to": "tail"}}}))
-
-
 def test_a_tracked_point_travels_along_its_net_motion(run: Run, tmp_path: Path) -> None:
     time, travel, unit = run_series(run, "travel")
     assert unit == "m"
@@ -363,73 +267,6 @@ def test_a_map_that_is_none_is_refused(subtests: pytest.Subtests, tmp_path: Path
             (folder / "map.toml").write_text(text)
             with pytest.raises(ConfigError, match=words):
                 read_map(folder / "map.toml")
-
-
-def test_a_damaged_file_is_refused_in_a_sentence(subtests: pytest.Subtests, tmp_path: Path) -> None:
-    for content in (b"", b"\x00\xff\xfe garbage \x80", b"MATLAB 7.3"):
-        for name in ("log.csv", "log.parquet", "log.mat", "log.nc", "log.h5"):
-            with subtests.test(f"{content!r:.60}, {name!r:.60}"):
-                folder = Path(tempfile.mkdtemp(dir=tmp_path))
-                (folder / name).write_bytes(content)
-                with pytest.raises(AnnelidError):
-                    read_measured(folder / name, LogMap.model_validate({"time": "t_ms", "map": SIGNALS}))
-                with pytest.raises(UnreadableText, match="no such file"):
-                    read_measured(folder / "none.csv", LogMap.model_validate({"time": "t_ms", "map": SIGNALS}))
-
-
-def test_a_small_file_that_holds_terabytes_is_refused_before_it_is_read(tmp_path: Path) -> None:
-    log_map = LogMap.model_validate({"time": "t_ms", "map": SIGNALS})
-    with h5py.File(tmp_path / "log.h5", "w") as file:
-        file.create_dataset("tracks", shape=(1, 2, 1000, 10**9), dtype="f8", chunks=(1, 2, 10, 1000))
-        file["node_names"] = [b"head"]
-    with h5py.File(tmp_path / "log.nc", "w") as file:
-        file.create_dataset("t_ms", shape=(10**12,), dtype="f8", chunks=(1000,))
-    for name in ("log.h5", "log.nc"):
-        assert (tmp_path / name).stat().st_size < 100_000
-        with pytest.raises(UnreadableText, match="MB, more than 300"):
-            read_measured(tmp_path / name, log_map)
-
-
-def elsewhere_by_link(file: h5py.File, secret: Path) -> None:
-    file["t_ms"] = h5py.ExternalLink(str(secret), "numbers")
-
-
-def elsewhere_by_storage(file: h5py.File, secret: Path) -> None:
-    file.create_dataset("t_ms", shape=(8,), dtype="u1", external=[(str(secret), 0, 8)])
-
-
-def elsewhere_by_layout(file: h5py.File, secret: Path) -> None:
-    layout = h5py.VirtualLayout(shape=(8,), dtype="f8")
-    layout[:] = h5py.VirtualSource(str(secret), "numbers", shape=(8,))
-    file.create_virtual_dataset("t_ms", layout)
-
-
-def test_a_file_that_points_to_others_is_refused(subtests: pytest.Subtests, tmp_path: Path) -> None:
-    for point in (elsewhere_by_link, elsewhere_by_storage, elsewhere_by_layout):
-        for name in ("log.h5", "log.nc"):
-            with subtests.test(f"{point!r:.60}, {name!r:.60}"):
-                folder = Path(tempfile.mkdtemp(dir=tmp_path))
-                with h5py.File(folder / "secret.h5", "w") as file:
-                    file["numbers"] = np.arange(8.0)
-                with h5py.File(folder / name, "w") as file:
-                    point(file, folder / "secret.h5")
-                with pytest.raises(UnreadableText, match="elsewhere"):
-                    read_measured(folder / name, LogMap.model_validate({"time": "t_ms", "map": SIGNALS}))
-
-
-def test_a_tracked_frame_far_away_is_refused(run: Run, tmp_path: Path) -> None:
-    path = sleap_table(run, tmp_path)
-    lines = path.read_text().splitlines()
-    path.write_text("\n".join([*lines[:-1], lines[-1].replace(",424,", ",999999999999,")]))
-    assert "999999999999" in path.read_text()
-    with pytest.raises(UnreadableText, match="MB, more than 300"):
-        read_measured(path, LogMap.model_validate({"rate_Hz": 25.0, "m_per_px": 1e-3, "map": {"front": "travel"}}))
-
-
-def test_a_table_without_a_header_is_refused(run: Run, tmp_path: Path) -> None:
-    log_of(run).to_csv(tmp_path / "log.csv", index=False, header=False)
-    with pytest.raises(UnreadableText, match="has no header"):
-        compared(run, tmp_path / "log.csv")
 
 
 @given(st.floats(8.0, 60.0), st.integers(0, 2**31))

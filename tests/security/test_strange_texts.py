@@ -15,36 +15,32 @@ from annelid import Network, simulate
 from annelid.config import load_config, load_study, parse_assignments
 from annelid.errors import AnnelidError, SimulationStopped
 from annelid.experiment.spread import read_spread
-from annelid.nervous import GapJunction, Gate, ModulatorySynapse, Neuron, SpikingSynapse, Synapse
-from annelid.nervous.neurons import Channel, Firing
+from annelid.nervous import Gate, Neuron, Synapse
+from annelid.simulation import Run
 from annelid.textfiles import MOST_BYTES, parse_toml
 from annelid_lab.calibration import read_loop
 from annelid_studies.robustness import read_judged
 
 LONGEST_S = 20.0
-TOML = {
+QUOTES = {
+    "escaped quotes, not closed": 'x = "' + '\\"' * 500_000,
+    "escaped quotes, three not closed": 'x = """' + '\\"""' * 250_000,
+    "backslashes, not closed": 'x = "' + "\\" * 1_000_001,
+    "dotted key behind five quotes": f"x = ['''a''''', '''\n''']\n{'.'.join(['a'] * 500_000)} = 1\n#'''",
+    "dotted key, quoted": ".".join(['"a \\"b"'] * 200_000) + " = 1",
+    "nearly a dotted key": ("a . " * 60 + ",") * 5000,
+}
+TOML = QUOTES | {
     "brackets": "x = " + "[" * 5000 + "]" * 5000,
     "inline tables": "x = " + "{a = " * 5000 + "1" + "}" * 5000,
-    "dotted key": ".".join(["a"] * 3000) + " = 1",
-    "dotted key, very long": ".".join(["a"] * 200_000) + " = 1",
-    "dotted key, quoted": ".".join(['"a b"'] * 200_000) + " = 1",
-    "dotted header": "[" + ".".join(["a"] * 3000) + "]\nx = 1",
+    "dotted header": "[" + ".".join(["a"] * 200_000) + "]\nx = 1",
     "digits": "duration_s = " + "1" * 5000,
     "digits in base 16": "duration_s = 0x" + "f" * 100_000,
-    "unknown keys": "".join(f"k{i} = {i}\n" for i in range(30_000)),
-    "unknown keys in a section": "[body.mesh]\n" + "".join(f"k{i} = {i}\n" for i in range(30_000)),
+    "unknown keys": "[body.mesh]\n" + "".join(f"k{i} = {i}\n" for i in range(30_000)),
     "long name of a key": "a" * 1_000_000 + " = 1",
     "posts": f"[arena]\nposts = [{'[-3.0, 0.1, 0.1], ' * 20_000}]",
     "long text": f'duration_s = "{"x" * 1_000_000}"',
     "null": 'x = "\x00"',
-    "nothing closed": 'x = """' + "a" * 100_000,
-    "escaped quotes, not closed": 'x = "' + '\\"' * 500_000,
-    "escaped quotes on every line": 'x = "\\"\n' * 150_000,
-    "escaped quotes, three not closed": 'x = """' + '\\"""' * 250_000,
-    "escaped quotes, three, and a backslash": 'x = """' + '\\"""' * 250_000 + "\\",
-    "backslashes, not closed": 'x = "' + "\\" * 1_000_001,
-    "dotted key behind four quotes": f'x = ["""a"""", """\n"""]\n{".".join(["a"] * 500_000)} = 1\n#"""',
-    "dotted key behind five quotes": f"x = ['''a''''', '''\n''']\n{'.'.join(['a'] * 500_000)} = 1\n#'''",
     "empty key": '"" = 1',
 }
 
@@ -66,6 +62,9 @@ def test_strange_toml_is_refused_by_every_reader(tmp_path: Path, subtests: pytes
     for name, text in TOML.items():
         path.write_text(text, encoding="utf-8")
         with subtests.test(name):
+            if name in QUOTES:
+                refused(lambda text=text: parse_toml(text, "it"), 3.0)
+                continue
             refused(lambda: load_config(path))
             if len(text) <= 200_000:
                 refused(lambda: load_study(path))
@@ -73,22 +72,12 @@ def test_strange_toml_is_refused_by_every_reader(tmp_path: Path, subtests: pytes
                 refused(lambda: load_config("riddle2023-rods", arena=path))
 
 
-def test_a_text_of_a_megabyte_is_refused_at_once() -> None:
-    for text in (text for name, text in TOML.items() if "quotes" in name or "backslash" in name):
-        refused(lambda text=text: parse_toml(text, "it"), 2.0)
-
-
-def fifo(path: Path) -> None:
-    os.mkfifo(path)
-
-
 FILES: dict[str, Callable[[Path], object]] = {
     "folder": lambda path: path.mkdir(),
     "link to itself": lambda path: path.symlink_to(path),
     "endless device": lambda path: path.symlink_to("/dev/zero"),
-    "pipe": fifo,
+    "pipe": lambda path: os.mkfifo(path),
     "not UTF-8": lambda path: path.write_bytes(b'x = "\xff\xfe"'),
-    "UTF-16": lambda path: path.write_text("x = 1", encoding="utf-16"),
     "too long": lambda path: path.write_bytes(b"#" * (MOST_BYTES + 1)),
     "missing": lambda _: None,
 }
@@ -137,32 +126,16 @@ def test_a_mapping_that_holds_itself_is_refused() -> None:
     assert "too deeply" in refused(lambda: load_study(tree))
 
 
-@pytest.mark.parametrize("number", [float("nan"), float("inf"), -float("inf")])
-def test_a_network_takes_no_number_that_is_not_finite(number: float) -> None:
-    parts: list[Callable[[], object]] = [
-        lambda: Neuron(number),
-        lambda: Neuron(rest_mV=number),
-        lambda: Neuron(bias_nA=number),
-        lambda: Neuron(leak_conductance_uS=number),
-        lambda: Gate(number),
-        lambda: Gate(1.0, power=number),
-        lambda: Channel(1.0, number),
-        lambda: Firing(number),
-        lambda: Firing(adaptation=number),
-        lambda: Synapse(number, 1.0),
-        lambda: Synapse(1.0, number),
-        lambda: Synapse(1.0, 1.0, saturation_mV=number),
-        lambda: GapJunction(number),
-        lambda: SpikingSynapse(1.0, number),
-        lambda: ModulatorySynapse("leak", number),
-        lambda: Network().add_neuron("n", Neuron(), number),
-        lambda: Network.from_toml(f"[[neuron]]\nname = 'a'\nrest_mV = {number}"),
-    ]
-    for part in parts:
-        assert "must be" in refused(part)
-
-
-def test_names_that_no_file_can_hold_are_refused() -> None:
+def test_a_network_takes_no_number_that_is_not_finite_and_no_name_that_no_file_can_hold() -> None:
+    for number in (float("nan"), float("inf"), -float("inf")):
+        for part in (
+            lambda number=number: Neuron(number),
+            lambda number=number: Gate(number),
+            lambda number=number: Synapse(number, 1.0),
+            lambda number=number: Network().add_neuron("n", Neuron(), number),
+            lambda number=number: Network.from_toml(f"[[neuron]]\nname = 'a'\nrest_mV = {number}"),
+        ):
+            assert "must be" in refused(part)
     for name in ("\ud800", 3, None):
         refused(lambda name=name: Network().add_neuron(name, Neuron()))  # type: ignore[arg-type]
 
@@ -171,11 +144,6 @@ def test_what_is_no_configuration_is_refused(tmp_path: Path) -> None:
     for config in (3, [], object(), {"durration_s": 1}, {"extends": "nothing"}):
         refused(lambda config=config: simulate(config, tmp_path / "run"))  # type: ignore[arg-type]
     assert not (tmp_path / "run" / "run.nc").exists()
-
-
-def test_a_mapping_is_a_configuration(tmp_path: Path) -> None:
-    run = simulate({"extends": "riddle2022-planar", "duration_s": 0.1}, tmp_path / "run", progress=False)
-    assert run.status == "complete"
 
 
 @pytest.mark.parametrize("kind", ["daltorio2013", "boxerbaum2012"])
@@ -191,16 +159,12 @@ def test_a_body_that_takes_hours_to_build_is_refused_with_an_estimate() -> None:
     sentence = refused(lambda: load_config("riddle2023-rods", largest))
     assert all(path in sentence for path in largest)
     assert "GB" in sentence
-    for one in largest.items():
-        load_config("riddle2023-rods", {"body.mesh.elements_per_side": 2, **dict([one])})
 
 
-def test_a_video_of_a_billion_pictures_is_refused(tmp_path: Path) -> None:
+def test_a_video_of_a_billion_pictures_is_refused(planar_run: Run, tmp_path: Path) -> None:
     from annelid.draw.render import render_video
 
-    run = simulate({"extends": "riddle2022-planar", "duration_s": 0.1}, tmp_path / "run", progress=False)
-    sentence = refused(lambda: render_video(run, tmp_path / "v.mp4", speed=1e-9))
-    assert "speed = 1e-09" in sentence
+    assert "speed = 1e-09" in refused(lambda: render_video(planar_run, tmp_path / "v.mp4", speed=1e-9))
     assert not (tmp_path / "v.mp4").exists()
 
 

@@ -11,9 +11,9 @@ from small_robot import assert_equal, small_config
 
 from annelid import load_config, open_run, simulate
 from annelid.analysis import summary
-from annelid.analysis.track import track_of, turn_of
+from annelid.analysis.track import track_of
 from annelid.protocols import SIDES
-from annelid_studies.turning import COUNTER
+from annelid_studies.turning import COUNTER, turn_of
 
 LEFT = {"turning": {"kind": "constant", "modulation": 0.8, "descending_time_constant_s": 0.05}}
 RIGHT_POST = {"arena.posts": [[0.1, 0.185, 0.03]]}

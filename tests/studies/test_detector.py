@@ -5,15 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import isnan
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 import xarray as xr
 
-from annelid.analysis.gait import slip_cost
+from annelid.config import check_config
 from annelid.errors import RunFileError
 from annelid.protocols import Array
+from annelid.simulation import Run
+from annelid_studies.slip import speed_and_loss
 from annelid_studies.slip_detector.scores import Detection, detect_slip, precision_recall, score_detections
 
 
@@ -72,7 +73,6 @@ class Recorded:
 
     data: xr.Dataset
     path: Path = Path("run.nc")
-    config: Any = None
 
 
 def sliding(speed: Array, load: Array) -> Recorded:
@@ -117,17 +117,7 @@ def test_a_run_without_skin_is_refused() -> None:
         detect_slip(run)  # type: ignore[arg-type]
 
 
-@dataclass
-class _Body:
-    n_segments: int = 3
-
-
-@dataclass
-class _Config:
-    body: _Body
-
-
-def crawling(cycles: float) -> Recorded:
+def crawling(cycles: float) -> Run:
     """A worm of period 2 s that goes 0.1 m/s towards -x and loses 0.3 W, but far more before its first cycle."""
     time = 0.01 * np.arange(round(200 * cycles))
     phase = (time[:, None] - np.array([0.3, 1.0, 1.6])) % 2.0
@@ -142,15 +132,9 @@ def crawling(cycles: float) -> Recorded:
         },
         coords={"time": time, "axis": ["x", "y", "z"]},
     )
-    return Recorded(data, config=_Config(_Body()))
+    return Run(Path("run.nc"), data, check_config({}), "complete", "")
 
 
 def test_the_cost_of_slip_is_that_of_whole_cycles_behind_the_first() -> None:
-    cost = slip_cost(crawling(5.4))  # type: ignore[arg-type]
-    assert cost is not None
-    assert cost.cycles == 4
-    assert cost.period_s == pytest.approx(2.0, abs=0.01)
-    assert cost.speed_m_per_s == pytest.approx(0.1, rel=1e-6)
-    assert cost.loss_W == pytest.approx(0.3, rel=1e-6)
-    assert cost.loss_J_per_m == pytest.approx(3.0, rel=1e-6)
-    assert slip_cost(crawling(1.5)) is None  # type: ignore[arg-type]
+    assert speed_and_loss(crawling(5.4)) == pytest.approx((0.1, 3.0), rel=1e-6)
+    assert np.isnan(speed_and_loss(crawling(1.5))).all()

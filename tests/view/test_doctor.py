@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from annelid.draw import doctor, gl
+from annelid.draw import doctor
 
 
 def finding(item: str) -> str:
@@ -20,13 +20,6 @@ def test_a_program_that_is_no_ffmpeg_is_found_out(monkeypatch: pytest.MonkeyPatc
     line = finding("ffmpeg")
     assert line.startswith("missing")
     assert line.endswith("unset IMAGEIO_FFMPEG_EXE")
-
-
-def test_a_back_end_of_the_users_that_fails_is_to_be_unset(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("MUJOCO_GL", "egl")
-    monkeypatch.setattr(gl, "works", lambda backend: False)
-    monkeypatch.setattr(doctor, "works", lambda backend: False)
-    assert "unset MUJOCO_GL" in finding("frames and videos")
 
 
 def test_an_engine_that_cannot_be_imported_is_a_finding(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -21,8 +21,8 @@ from annelid.live.player import Player, player_of
 from annelid.live.things import triangles
 from annelid.simulation.runfile import Run
 from annelid.simulation.worm import compile_worm
+from annelid_lab.logs import LogMap, read_measured
 from annelid_lab.logs.agreement import compare_with_log, run_series
-from annelid_lab.logs.measured import LogMap, read_measured
 from annelid_lab.logs.report import measured_plots
 
 FRAME_S = 0.04

@@ -7,7 +7,6 @@ import imageio.v3
 import numpy as np
 import pytest
 
-from annelid.analysis.rhombi import actuated, rhombus_plane
 from annelid.body.worm import WormBody
 from annelid.config import load_config
 from annelid.draw.camera import picture_axes
@@ -29,6 +28,7 @@ from annelid_studies.riddle2023.figures.renderings import (
     rest_posture,
     rhombus_outline,
 )
+from annelid_studies.riddle2023.figures.rhombi import actuated, rhombus_plane
 
 LATE_S = 0.2
 needs_gl = pytest.mark.skipif(not rendering_works(), reason="no OpenGL back-end works on this machine")

@@ -191,7 +191,9 @@ def test_the_scale_bar_is_as_long_as_it_says(subtests: pytest.Subtests) -> None:
         with subtests.test(f"{width!r:.60}"):
             length_m = bar_length(width, pixels_per_m)
             assert length_name(length_m) == name
-            overlay = Overlay((width, 500), [("strand", (0.0, 0.0, 1.0), "line")], pixels_per_m, "black", "white")
+            overlay = Overlay(
+                (width, 500), [("strand", (0.0, 0.0, 1.0), "line")], pixels_per_m, "black", (1.0, 1.0, 1.0)
+            )
             drawn = overlay.stamped(np.full((500, width, 3), 255, dtype=np.uint8), "")
             dark = drawn[250:, width // 2 :].max(axis=2) < 60
             assert dark.sum(axis=1).max() == pytest.approx(length_m * pixels_per_m, abs=2)

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from annelid.analysis.comparison import compare
     from annelid.analysis.elongation import end_difference, interior_deficit, middle_deficit
     from annelid.analysis.energy import Energy, energy_balance
-    from annelid.analysis.gait import SlipCost, slip_cost
     from annelid.analysis.interval import CONFIDENCE, Estimate, mean_and_interval
     from annelid.analysis.numbers import Number
     from annelid.analysis.paper import (
@@ -26,17 +25,6 @@ if TYPE_CHECKING:
         ROBOT_ELONGATION_M,
     )
     from annelid.analysis.passage import Passage, passage_of
-    from annelid.analysis.rhombi import (
-        Deformation,
-        actuated,
-        deformation,
-        distance_from_ring_m,
-        nearest_frame,
-        nearest_time,
-        plane_means,
-        rhombus_diagonals,
-        rhombus_plane,
-    )
     from annelid.analysis.rhythm import (
         CONTRACTED,
         DESIGN_INTERVAL_S,
@@ -45,7 +33,7 @@ if TYPE_CHECKING:
         segment_activation,
         stretches,
     )
-    from annelid.analysis.track import Track, forward_position, track_of, turn_of
+    from annelid.analysis.track import Track, forward_position, nearest_frame, nearest_time, track_of
 
 __all__ = [
     "CONFIDENCE",
@@ -57,21 +45,16 @@ __all__ = [
     "PAPER_MIDDLE_DEFICIT",
     "ROBOT_ELONGATION_M",
     "SHORTEST_S",
-    "Deformation",
     "Energy",
     "Estimate",
     "Gait",
     "Number",
     "Passage",
     "RhythmScore",
-    "SlipCost",
     "Summary",
     "Track",
-    "actuated",
     "compare",
     "contractions",
-    "deformation",
-    "distance_from_ring_m",
     "end_difference",
     "energy_balance",
     "forward_position",
@@ -83,16 +66,12 @@ __all__ = [
     "nearest_frame",
     "nearest_time",
     "passage_of",
-    "plane_means",
-    "rhombus_diagonals",
-    "rhombus_plane",
     "rhythm_score",
     "segment_activation",
-    "slip_cost",
     "stretches",
     "summary",
     "track_of",
-    "turn_of",
 ]
 
-__getattr__, __dir__ = lazy(__name__, now=("annelid_studies.slip_detector",))
+_MOVED = tuple(f"annelid_studies.{home}" for home in ("slip_detector", "slip", "turning", "riddle2023.figures.rhombi"))
+__getattr__, __dir__ = lazy(__name__, now=_MOVED)

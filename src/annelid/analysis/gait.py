@@ -14,7 +14,7 @@ import numpy as np
 from annelid.analysis.muscles import cable_work, muscle_work
 from annelid.analysis.numbers import number, ratio
 from annelid.analysis.rhythm import run_rhythm
-from annelid.analysis.track import first_heading, fitted_circle, forward_position, track_of
+from annelid.analysis.track import first_heading, fitted_circle, track_of
 from annelid.protocols import Array
 from annelid.simulation.runfile import Run
 
@@ -157,35 +157,3 @@ def _steps(run: Run, marks: Array) -> tuple[Array, Array]:
     times = marks[:-1, np.newaxis] + np.diff(marks)[:, np.newaxis] * np.linspace(0.0, 1.0, 64, endpoint=False)
     angle = np.interp(times, track.time_s, track.heading_rad).mean(axis=1)
     return steps, -np.array([np.cos(angle), np.sin(angle)]).T
-
-
-@dataclass(frozen=True, slots=True)
-class SlipCost:
-    """Speed and loss over complete cycles, from the second contraction of segment 1 to its last.
-
-    Attributes:
-        cycles: Number of complete cycles.
-        period_s: Mean duration of a cycle, s.
-        speed_m_per_s: Displacement of the centre of mass along the initial heading, over time, m/s.
-        loss_W: Work lost to friction over time, W.
-        loss_J_per_m: The same over that displacement, J/m; infinite for a worm that got nowhere or backwards.
-    """
-
-    cycles: int
-    period_s: float
-    speed_m_per_s: float
-    loss_W: float
-    loss_J_per_m: float
-
-
-def slip_cost(run: Run) -> SlipCost | None:
-    """Reads what a run that recorded ``slip_loss`` lost to friction; None for fewer than three contractions."""
-    marks = cycle_marks(run)
-    if len(marks) < 2:
-        return None
-    time, loss = run.data["time"].values, run.data["slip_loss"].values.sum(axis=1)
-    ends = np.searchsorted(time, marks[[0, -1]])
-    duration, travel, lost = (float(np.diff(each[ends])[0]) for each in (time, forward_position(run), loss))
-    cycles = len(marks) - 1
-    cost = lost / travel if travel > 0.0 else np.inf
-    return SlipCost(cycles, duration / cycles, travel / duration, lost / duration, cost)

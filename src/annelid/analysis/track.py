@@ -122,55 +122,38 @@ def track_of(run: Run) -> Track:
     return Track(data["frame_time"].values, data["crossing_position"].values, geometry.n_per_plane, rings)
 
 
-@dataclass(frozen=True, slots=True)
-class Turn:
-    """How a worm turned over complete cycles.
-
-    Attributes:
-        cycles: Complete cycles between the two ends.
-        angle_rad: Change of the heading, positive to the left.
-        path_m: Length of the path of the middle of the body, from cycle to cycle.
-        curvature_per_m: Angle over path; positive to the left.
-    """
-
-    cycles: int
-    angle_rad: float
-    path_m: float
-    curvature_per_m: float
-
-    @property
-    def radius_m(self) -> float:
-        """Radius of the circle, m; infinite for a straight path, NaN for one of no length."""
-        return np.inf if self.curvature_per_m == 0 else abs(1.0 / self.curvature_per_m)
-
-
-def turn_of(track: Track, period_s: float, after_s: float = 0.0) -> Turn:
-    """Measures the turn over as many complete cycles as there are.
-
-    Samples a cycle apart are compared, so that the swings within a cycle do not count; angle and path are means over
-    every phase of the cycle.
+def nearest_frame(run: Run, time_s: float) -> int:
+    """Returns the index of the recorded posture nearest to a time.
 
     Args:
-        track: The track.
-        period_s: Time of a cycle, s.
-        after_s: Time from which on it is measured, so that the start is left out, s.
+        run: The run.
+        time_s: The time, s.
 
     Raises:
-        RunFileError: Less than two complete cycles behind ``after_s``.
+        RunFileError: No postures recorded, or the time lies more than a frame's interval outside of them.
     """
-    first, last = max(after_s, float(track.time_s[0])), float(track.time_s[-1])
-    # The last complete cycle serves to average over its phases.
-    hops = int((last - first) / period_s + 1e-9) - 1 if period_s > 0 else 0
-    if hops < 1:
+    if "crossing_position" not in run.data or run.data.sizes.get("frame", 0) == 0:
+        raise RunFileError(f"{run.path} holds no recorded postures of a 3D worm")
+    return nearest_time(run, run.data["frame_time"].values, time_s)
+
+
+def nearest_time(run: Run, times_s: Array, time_s: float) -> int:
+    """Returns the index of the recorded time nearest to a wanted one, as `nearest_frame` does.
+
+    Args:
+        run: The run, which an error names.
+        times_s: Recorded times, s.
+        time_s: The wanted time, s.
+
+    Raises:
+        RunFileError: The run has no such time.
+    """
+    margin = float(np.diff(times_s).max()) if len(times_s) > 1 else 0.0
+    if not times_s[0] - margin <= time_s <= times_s[-1] + margin:
         raise RunFileError(
-            f"a turn takes at least two cycles of {period_s:g} s, not the {last - first:.4g} s from {first:.4g} s on"
+            f"{run.path} has no picture at {time_s:g} s: it was recorded from {times_s[0]:g} to {times_s[-1]:g} s"
         )
-    phases = np.linspace(0.0, period_s, 64, endpoint=False)
-    times = first + phases[:, np.newaxis] + period_s * np.arange(hops + 1)
-    x, y, heading = (np.interp(times, track.time_s, values) for values in (*track.middle_m.T, track.heading_rad))
-    path = float(np.hypot(np.diff(x, axis=1), np.diff(y, axis=1)).sum(axis=1).mean())
-    angle = float((heading[:, -1] - heading[:, 0]).mean())
-    return Turn(hops, angle, path, angle / path if path > 0 else float("nan"))
+    return int(np.abs(times_s - time_s).argmin())
 
 
 @dataclass(frozen=True, slots=True)

@@ -168,7 +168,8 @@ def view_command(
         str, typer.Option(help="Address to listen on; 0.0.0.0 lets in other machines that know the token.")
     ] = "127.0.0.1",
     port: Annotated[
-        int | None, typer.Option(min=0, max=65535, help="Port; 0 for any that is free  [default: the first from 8080]")
+        int | None,
+        typer.Option(min=0, max=65535, help="Port; 0 for any that is free  [default: 8080, or any if it is taken]"),
     ] = None,
     force: Force = False,
 ) -> None:

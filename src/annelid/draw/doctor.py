@@ -85,7 +85,7 @@ def _package(name: str, remedy: str, *, optional: bool = False) -> Finding:
 
 def _back_ends() -> Iterator[Finding]:
     try:
-        tried = candidates(os.environ, platform.system())
+        tried = candidates()
     except RenderingUnavailable as error:
         yield Finding("OpenGL", False, str(error), optional=True)
         return

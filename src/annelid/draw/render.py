@@ -16,9 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from annelid.analysis.gait import cycle_marks
-from annelid.analysis.rhombi import nearest_time
+from annelid.analysis.track import nearest_time
 from annelid.draw.canvas import WIDTH_IN, canvas, save
-from annelid.draw.overlay import background_of, legend_handle, length_name
 from annelid.errors import MissingDependency, RunFileError
 from annelid.output import whole_file, with_suffix
 from annelid.simulation.runfile import Run
@@ -111,6 +110,8 @@ def render_strip(
         RunFileError: As of `render_frame`, the body is planar, or ``n_frames`` is out of range.
         RenderingUnavailable: No OpenGL back-end works.
     """
+    from annelid.draw.overlay import background_of, legend_handle, length_name
+
     path = with_suffix(path, STRIP_SUFFIXES, "a strip of frames")
     fewest, most = STRIP_RANGE
     if not fewest <= n_frames <= most:
@@ -210,6 +211,7 @@ def _scene(
 ) -> WormScene | PlanarScene:
     if not run.config.body.is_planar:
         return _worm_scene(run, size, camera, background, fine=fine, words=True)
+    from annelid.draw.overlay import background_of
     from annelid.draw.planar_scene import PlanarScene
 
     if camera is not None:

@@ -18,7 +18,7 @@ from annelid.body.rows import tied_bodies
 from annelid.config import RunConfig
 from annelid.draw.camera import FIELD_OF_VIEW_DEG, FIXED, fitting_distance, picture_points, view_angles
 from annelid.draw.canvas import CONTRACTED, activation_color
-from annelid.draw.gl import Canvas, find_backend
+from annelid.draw.gl import Canvas
 from annelid.draw.overlay import BRIGHT, DIM, Background, Entry, Overlay, background_of, bar_length
 from annelid.errors import RunFileError
 from annelid.protocols import Array
@@ -201,8 +201,7 @@ class _Scene(Canvas):
         background: str = "floor",
         words: bool = True,
     ) -> None:
-        sky = background == "floor"
-        super().__init__(worm.model, *size, find_backend(), fine=fine, sky=sky, upright=upright)
+        super().__init__(worm.model, *size, fine=fine, upright=upright)
         self._worm = worm
         self.legend = worm.legend()
         self.pixels_per_m = size[1] / (2.0 * math.tan(math.radians(FIELD_OF_VIEW_DEG) / 2) * distance_m)
@@ -432,7 +431,7 @@ def _set_fog(model: mujoco.MjModel, start_m: float, end_m: float) -> None:
 
 
 def _light(spec: mujoco.MjSpec, behind: Background, material: str = "floor") -> None:
-    """Gives a model a picture's lens and light, and its floor a colour."""
+    """Gives a model a picture's lens and light, and floor and sky the colours of the background."""
     visual = spec.visual
     visual.global_.fovy = FIELD_OF_VIEW_DEG
     visual.headlight.diffuse = [HEADLIGHT] * 3
@@ -445,6 +444,10 @@ def _light(spec: mujoco.MjSpec, behind: Background, material: str = "floor") -> 
         floor = spec.material(material)
         floor.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = ""
         floor.rgba = [*behind.floor, 1.0]
+        for texture in spec.textures:
+            if texture.type == mujoco.mjtTexture.mjTEXTURE_SKYBOX:
+                texture.builtin = mujoco.mjtBuiltin.mjBUILTIN_FLAT
+                texture.rgb1 = texture.rgb2 = behind.haze
     visual.map.fogstart, visual.map.fogend = 4.0, 12.0
     for light in spec.lights:
         light.type = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL

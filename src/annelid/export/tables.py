@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -14,8 +14,9 @@ import numpy as np
 import xarray as xr
 
 from annelid.errors import RunFileError, suggest
-from annelid.output import whole_file, write_csv, write_json
+from annelid.output import plain_cell, whole_file, write_json
 from annelid.simulation.runfile import Run
+from annelid.text import numbered
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -24,8 +25,6 @@ if TYPE_CHECKING:
 CLOCKS = {"time": "time", "frame": "frame_time"}
 """Dimensions that go with time, and the variable that has it."""
 ABOUT = "about.json"
-CHUNK_ROWS = 20_000
-"""Rows that are written as CSV between two reports of progress."""
 LONGEST_NAME = 63
 """Characters that MATLAB reads of a name."""
 STRUCTS = ("units", "long_name", "dimensions", "labels", "config", "run")
@@ -152,16 +151,13 @@ def write_csv_tables(run: Run, path: Path, progress: Progress) -> list[Path]:
     A folder gets ``about.json`` besides, which says what the run is.
     """
 
-    def write(table: Table, file: Path, wrote: Callable[[int], None]) -> None:
+    def write(table: Table, file: Path) -> None:
         values, columns = table
-
-        def rows() -> Iterator[tuple[object, ...]]:
-            for start in range(0, len(values), CHUNK_ROWS):
-                chunk = values[start : start + CHUNK_ROWS]
-                yield from zip(*(chunk[name].tolist() for name in values), strict=True)
-                wrote(len(chunk))
-
-        write_csv(file, [f"{name} ({columns[name][0]})" if columns[name][0] else name for name in values], rows())
+        words = values.select_dtypes(exclude="number").columns
+        values = values.assign(**{name: values[name].map(plain_cell) for name in words})
+        header = [plain_cell(f"{name} ({columns[name][0]})" if columns[name][0] else name) for name in values]
+        with whole_file(file) as draft:
+            values.to_csv(draft, header=header, index=False, na_rep="nan", lineterminator="\n")
 
     written = _write_tables(run, path, ".csv", write, progress)
     return written if path in written else [*written, write_json(path / ABOUT, about(run))]
@@ -177,7 +173,7 @@ def write_parquet_tables(run: Run, path: Path, progress: Progress) -> list[Path]
 
     facts = {"annelid": json.dumps(about(run))}
 
-    def write(table: Table, file: Path, wrote: Callable[[int], None]) -> None:
+    def write(table: Table, file: Path) -> None:
         values, columns = table
         arrays = [pa.array(values[name].to_numpy()) for name in values]
         fields = [
@@ -186,13 +182,12 @@ def write_parquet_tables(run: Run, path: Path, progress: Progress) -> list[Path]
         ]
         with whole_file(file) as draft:
             pq.write_table(pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata=facts)), draft)
-        wrote(len(values))
 
     return _write_tables(run, path, ".parquet", write, progress)
 
 
 def _write_tables(
-    run: Run, path: Path, suffix: str, write: Callable[[Table, Path, Callable[[int], None]], None], progress: Progress
+    run: Run, path: Path, suffix: str, write: Callable[[Table, Path], None], progress: Progress
 ) -> list[Path]:
     """Writes every table of a run into a folder, or its only one to a file."""
     tables = tables_of(run)
@@ -202,17 +197,13 @@ def _write_tables(
             f"{path} is one file, but these signals make {len(tables)} tables ({', '.join(tables)}): name a folder, "
             "or choose signals of the same dimensions with --signals"
         )
-    total, done = sum(len(values) for values, _ in tables.values()), 0
-
-    def wrote(rows: int) -> None:
-        nonlocal done
-        done += rows
-        progress(done, total)
-
     (path.parent if alone else path).mkdir(parents=True, exist_ok=True)
     files = {path if alone else path / f"{name}{suffix}": table for name, table in tables.items()}
-    for file, table in files.items():
-        write(table, file, wrote)
+    rows, done = [len(values) for values, _ in tables.values()], 0
+    for (file, table), own in zip(files.items(), rows, strict=True):
+        write(table, file)
+        done += own
+        progress(done, sum(rows))
     return list(files)
 
 
@@ -242,18 +233,11 @@ def write_matlab(run: Run, path: Path) -> Path:
 
 def matlab_names(names: Iterable[str], taken: Iterable[str] = ()) -> dict[str, str]:
     """Returns a legal and distinct MATLAB name for each name, none of those taken: letters, digits and underscores."""
-    legal: dict[str, str] = {}
-    used = set(taken)
-    for name in names:
-        stem = re.sub(r"\W", "_", name, flags=re.ASCII)
-        stem = (stem if stem[:1].isalpha() else f"x{stem}")[:LONGEST_NAME]
-        free, number = stem, 1
-        while free in used:
-            number += 1
-            free = f"{stem[: LONGEST_NAME - 4]}_{number}"
-        used.add(free)
-        legal[name] = free
-    return legal
+    names, taken = list(names), list(taken)
+    stems = [re.sub(r"\W", "_", name, flags=re.ASCII) for name in names]
+    # Room for a number is left to all.
+    stems = [(stem if stem[:1].isalpha() else f"x{stem}")[: LONGEST_NAME - 4] for stem in stems]
+    return dict(zip(names, numbered([*taken, *stems])[len(taken) :], strict=True))
 
 
 def _matlab_value(value: Any) -> Any:

@@ -15,7 +15,7 @@ from annelid.config import Kind, Line, Positive, RunConfig, Share
 from annelid.errors import ConfigError
 from annelid.protocols import Array
 from annelid.registry import Registry
-from annelid_lab.logs.measured import Column, LogMap, read_measured
+from annelid_lab.logs import Column, LogMap, read_measured
 
 Found = Mapping[str, Array]
 """Arrays that a test of a worm gives, by name."""

@@ -1,6 +1,7 @@
 """Measured logs: read into series in SI units, aligned with a run, and what they agree in."""
 
-from annelid_lab.logs.agreement import Agreement, compare_with_log
-from annelid_lab.logs.measured import Measured, read_map, read_measured
+from annelid_lab.logs.agreement import Agreement, compare_with_log, run_series
+from annelid_lab.logs.maps import Column, LogMap, read_map
+from annelid_lab.logs.measured import Measured, read_measured
 
-__all__ = ["Agreement", "Measured", "compare_with_log", "read_map", "read_measured"]
+__all__ = ["Agreement", "Column", "LogMap", "Measured", "compare_with_log", "read_map", "read_measured", "run_series"]

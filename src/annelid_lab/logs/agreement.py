@@ -16,7 +16,7 @@ from annelid.body import stretch_sensors, worm_of
 from annelid.errors import ConfigError, listed, shown, suggest
 from annelid.protocols import Array
 from annelid.simulation import Run
-from annelid_lab.logs.measured import OFF_SCALE, Measured
+from annelid_lab.logs.measured import Measured
 
 LEAST_OVERLAP = 0.5
 """Share of the shorter of both records that must overlap."""
@@ -28,6 +28,8 @@ LEAST_PERIODIC = 0.3
 """Smallest autocorrelation one period later of a signal that counts as periodic."""
 MOST_SAMPLES = 2_000_000
 """Of either record, as compared."""
+OFF_SCALE = 20.0
+"""A column that is so many times as large or as small as its signal has another unit than the map says."""
 MOST_DRIFT = 0.05
 """Largest drift of the log's clock that is looked for."""
 _REFERENCE = re.compile(r"^\s*(\w+)\s*(?:\[([^\[\]]*)\])?\s*$")

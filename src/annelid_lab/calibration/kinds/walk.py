@@ -14,7 +14,7 @@ from annelid.config import Line, NonNegative, RunConfig
 from annelid.errors import ConfigError
 from annelid.protocols import Array
 from annelid_lab.calibration.base import FEWEST, Data, Experiment, Found, binned, file_beside
-from annelid_lab.logs.measured import Measured, read_map, read_measured
+from annelid_lab.logs import Measured, read_map, read_measured
 
 
 @dataclass(frozen=True)

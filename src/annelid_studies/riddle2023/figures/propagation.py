@@ -11,15 +11,6 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 
-from annelid.analysis import (
-    Deformation,
-    actuated,
-    deformation,
-    distance_from_ring_m,
-    plane_means,
-    rhombus_diagonals,
-    rhombus_plane,
-)
 from annelid.draw import WIDTH_IN, canvas, panel_title, picture_axes, save_both
 from annelid.morphology import Array, MeshGeometry
 from annelid.simulation import Run
@@ -32,6 +23,15 @@ from annelid_studies.riddle2023.figures.renderings import (
     rendering_works,
     rhombus_outline,
     show_worm,
+)
+from annelid_studies.riddle2023.figures.rhombi import (
+    Deformation,
+    actuated,
+    deformation,
+    distance_from_ring_m,
+    plane_means,
+    rhombus_diagonals,
+    rhombus_plane,
 )
 
 TIME_S = 1.5

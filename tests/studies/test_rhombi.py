@@ -6,19 +6,19 @@ import numpy as np
 import pytest
 import xarray
 
-from annelid.analysis.rhombi import (
-    actuated,
-    deformation,
-    distance_from_ring_m,
-    nearest_frame,
-    plane_means,
-    rhombus_diagonals,
-    rhombus_plane,
-)
+from annelid.analysis import nearest_frame
 from annelid.config import load_config
 from annelid.errors import RunFileError
 from annelid.morphology import MeshGeometry, helical_mesh
 from annelid.simulation.runfile import Run
+from annelid_studies.riddle2023.figures.rhombi import (
+    actuated,
+    deformation,
+    distance_from_ring_m,
+    plane_means,
+    rhombus_diagonals,
+    rhombus_plane,
+)
 
 
 @pytest.fixture(params=[{}, {"n_segments": 4, "n_helices": 8, "radius_m": 0.1, "planes_between_rings": 3}])

@@ -7,10 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from annelid.errors import RunFileError
-from annelid.morphology import Indices, MeshGeometry
-from annelid.protocols import Array
-from annelid.simulation.runfile import Run
+from annelid.morphology import Array, Indices, MeshGeometry
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,43 +42,6 @@ def deformation(crossings_m: ArrayLike, geometry: MeshGeometry) -> Deformation:
     axial, lateral = rhombus_diagonals(crossings_m, geometry.rhombi)
     rest_axial, rest_lateral = rhombus_diagonals(geometry.crossings_m, geometry.rhombi)
     return Deformation(axial / rest_axial - 1.0, lateral / rest_lateral - 1.0)
-
-
-def nearest_frame(run: Run, time_s: float) -> int:
-    """Finds the recorded posture nearest to a time.
-
-    Args:
-        run: The run.
-        time_s: Simulated time, s.
-
-    Returns:
-        Index of the frame.
-
-    Raises:
-        RunFileError: No postures recorded, or the time lies more than a frame's interval outside of them.
-    """
-    if "crossing_position" not in run.data or run.data.sizes.get("frame", 0) == 0:
-        raise RunFileError(f"{run.path} holds no recorded postures of a 3D worm")
-    return nearest_time(run, run.data["frame_time"].values, time_s)
-
-
-def nearest_time(run: Run, times_s: Array, time_s: float) -> int:
-    """Returns the index of the recorded time nearest to a wanted one, as `nearest_frame` does.
-
-    Args:
-        run: The run, which an error names.
-        times_s: Recorded times, s.
-        time_s: The wanted time, s.
-
-    Raises:
-        RunFileError: The run has no such time.
-    """
-    margin = float(np.diff(times_s).max()) if len(times_s) > 1 else 0.0
-    if not times_s[0] - margin <= time_s <= times_s[-1] + margin:
-        raise RunFileError(
-            f"{run.path} has no picture at {time_s:g} s: it was recorded from {times_s[0]:g} to {times_s[-1]:g} s"
-        )
-    return int(np.abs(times_s - time_s).argmin())
 
 
 def rhombus_plane(geometry: MeshGeometry) -> Indices:

@@ -275,7 +275,7 @@ def test_the_ground_is_there(arena: str, overrides: dict[str, Any], nodes: set[s
     player, anatomy = player_of(config)
     server = Server()
     try:
-        stage = Stage(server, config, Painter(anatomy, config), player.moment)
+        stage = Stage(server, config, painter_of(anatomy, config, player.moment), player.moment)
         names = {"floor", "rail_left", "rail_right", "post_0", "relief", "pipe"}
         assert {name for name in names if server.scene.get_handle_by_name(f"/worm/ground/{name}")} == nodes
         for layer in LAYERS:
@@ -292,7 +292,7 @@ def test_a_ray_is_turned_into_the_axes_of_a_slope() -> None:
     player, anatomy = player_of(config)
     server = Server()
     try:
-        stage = Stage(server, config, Painter(anatomy, config), player.moment)
+        stage = Stage(server, config, painter_of(anatomy, config, player.moment), player.moment)
         player.tick(0.5)
         stage.show(player.moment, follow=True)
         place, along = np.array([0.3, -0.1, 0.2]), np.array([0.0, 0.6, 0.8])

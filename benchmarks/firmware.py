@@ -20,16 +20,13 @@ from typing import Any
 import numpy as np
 
 import annelid
-from annelid.control.base import SENSED
+from annelid.control import SENSED
 from annelid.nervous import (
     Channel,
-    Firing,
     GapJunction,
     Gate,
-    ModulatorySynapse,
     Network,
     Neuron,
-    SpikingSynapse,
     Stepper,
     Synapse,
     persistent_sodium,
@@ -77,31 +74,21 @@ def random_network(seed: int) -> Network:
         return tuple(made)
 
     for i in range(n):
-        firing = Firing(rng.uniform(5.0, 15.0), 0.0, rng.uniform(-0.2, 0.5), rng.uniform(5.0, 50.0))
         neuron = Neuron(
             capacitance_nF=rng.uniform(3.0, 20.0),
             leak_conductance_uS=rng.uniform(0.5, 1.5),
             rest_mV=rng.uniform(-2.0, 2.0),
             bias_nA=rng.uniform(0.0, 18.0),
             channels=channels(),
-            firing=firing if rng.random() < 0.4 else None,
         )
         network.add_neuron(f"n{i}", neuron, rng.uniform(-5.0, 4.0))
     for _ in range(int(rng.integers(1, 4 * n))):
         source, target = (f"n{i}" for i in rng.integers(0, n, 2))
         opening = float(rng.uniform(-5.0, 5.0)), float(rng.uniform(6.0, 25.0))
-        choice = rng.random()
-        if choice < 0.4:
-            kind = Synapse(rng.uniform(0.0, 0.6), rng.uniform(-60.0, 100.0), *opening)
-        elif choice < 0.6 and network.neurons[source].firing is not None:
-            kind = SpikingSynapse(rng.uniform(0.0, 0.6), rng.uniform(-60.0, 100.0), rng.uniform(1.0, 30.0), 0.7)
-        elif choice < 0.8:
-            quantity = ("leak", "channels", "membrane", "gates")[int(rng.integers(4))]
-            kind = ModulatorySynapse(quantity, rng.uniform(0.5, 2.0), *opening)
+        if rng.random() < 0.7:
+            network.add_synapse(source, target, Synapse(rng.uniform(0.0, 0.6), rng.uniform(-60.0, 100.0), *opening))
         else:
             network.add_gap_junction(source, target, GapJunction(rng.uniform(0.0, 0.3), bool(rng.random() < 0.5)))
-            continue
-        network.add_synapse(source, target, kind)
     for i in range(int(rng.integers(0, 3))):
         network.add_input(f"in{i}", [f"n{int(rng.integers(n))}"])
     network.add_output("out", "n0")

@@ -82,11 +82,7 @@ def groups() -> Iterator[tuple[str, list[Network], float, float]]:
         controller: Any = annelid.build_controller(config, annelid.build_plant(config))
         yield name, [controller_network(controller)], 0.5, 5000.0
     networks = [random_network(seed) for seed in range(RANDOM)]
-    spiking = [any(each.firing is not None for each in network.neurons.values()) for network in networks]
-    silent = [network for network, spikes in zip(networks, spiking, strict=True) if not spikes]
-    firing = [network for network, spikes in zip(networks, spiking, strict=True) if spikes]
-    yield "random, without spikes", silent, 0.05, 200.0
-    yield "random, spiking", firing, 0.05, 200.0
+    yield "random", networks, 0.05, 200.0
 
 
 def main() -> None:

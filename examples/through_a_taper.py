@@ -31,7 +31,7 @@ def main(folder: Path, duration_s: float = 40.0) -> None:
             "riddle2025-muscles",
             {
                 "controller.kind": "sns-robust",
-                "controller.let_go": 0.35,
+                "controller.motor_time_constant_s": 0.35,
                 **changes,
                 "arena.narrowest": 0.13,
                 "duration_s": duration_s,

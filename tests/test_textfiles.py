@@ -14,8 +14,7 @@ from annelid import Network
 from annelid.config import load_config, parse_assignments, preset_names
 from annelid.errors import UnreadableText
 from annelid.experiment.case import Case
-from annelid.nervous import GapJunction, Gate, ModulatorySynapse, Neuron, SpikingSynapse, Synapse
-from annelid.nervous.neurons import Channel, Firing
+from annelid.nervous import Channel, GapJunction, Gate, Neuron, Synapse
 from annelid.textfiles import MOST_LEVELS, nested, parse_json, parse_toml, toml_text, toml_value
 
 # All that UTF-8 can hold: signs, blanks, quotes, worms, controls.
@@ -78,13 +77,10 @@ neurons = st.builds(
         st.builds(Channel, POSITIVE, FINITE, st.lists(st.builds(Gate, FINITE, factor=POSITIVE), max_size=2).map(tuple)),
         max_size=2,
     ).map(tuple),
-    firing=st.builds(Firing, st.floats(1, 1e300), st.floats(-1e300, 0)),
 )
 connections = st.one_of(
     st.builds(Synapse, POSITIVE, FINITE),
     st.builds(GapJunction, POSITIVE, st.booleans()),
-    st.builds(SpikingSynapse, POSITIVE, FINITE),
-    st.builds(ModulatorySynapse, st.sampled_from(["leak", "gates"]), POSITIVE),
 )
 
 

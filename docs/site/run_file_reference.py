@@ -22,7 +22,7 @@ BODIES = {
 HALF_RINGS = "riddle2025-3x1"
 WITH_ALL_SIGNALS = {
     "program": {"contractions": [{"segment": 1, "start_s": 0.0, "stop_s": 1.0}]},
-    "sns-robust": {"let_go_s": 0.35, "descending": {"lift": 0.45}},
+    "sns-robust": {"motor_time_constant_s": 0.35, "descending": {"lift": 0.45}},
 }
 """What kinds of controllers must be told before they record all that they can."""
 INTRODUCTION = """# The run file

@@ -31,6 +31,7 @@ __all__ = [
     "State",
     "Stateful",
     "Steering",
+    "SteeringCode",
     "Stoppable",
     "StridingController",
     "Values",
@@ -286,6 +287,29 @@ class SavedAndRecorded:
         return {}
 
 
+@dataclass(frozen=True, slots=True)
+class SteeringCode:
+    """A step of a steering as C99.
+
+    The statements may use the type ``real``, the integers ``i`` and ``j``, the counts ``N_SEGMENTS`` and ``N_MUSCLES``,
+    ``sensors->NAME`` of what is sensed, ``now.NAME`` of the state (``now.potential_mV``, ``now.n_steps`` and those
+    below), the constants, ``clipped(value, low, high)`` and ``EXP``, ``FMOD`` and ``ATAN2``.
+
+    Attributes:
+        statements: What multiplies ``activation->activation[]``.
+        senses: What it is given, names in `annelid.control.SENSED`.
+        constants: Numbers and arrays by name.
+        state: Initial values of its variables.
+        helpers: Functions that the statements call.
+    """
+
+    statements: str = ""
+    senses: tuple[str, ...] = ()
+    constants: Mapping[str, Any] = field(default_factory=dict)
+    state: Mapping[str, Any] = field(default_factory=dict)
+    helpers: str = ""
+
+
 class Steering(SavedAndRecorded, ABC):
     """What is left of the activation of the two halves of every ring, at every control step."""
 
@@ -302,8 +326,5 @@ class Steering(SavedAndRecorded, ABC):
         """
 
     @abstractmethod
-    def code(self) -> dict[str, Any]:
-        """Returns a step as C: fields of `annelid.control.base.ControllerCode`, and ``statements``.
-
-        The statements multiply the activation.
-        """
+    def code(self) -> SteeringCode:
+        """Returns a step as C."""

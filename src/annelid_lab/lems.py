@@ -12,10 +12,10 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import zip_longest
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 from annelid.errors import ConfigError, require_finite, require_positive, shortened, shown
-from annelid.nervous import Modulated, Network, network_of_tables, network_tables
+from annelid.nervous import Network, network_of_tables, network_tables
 from annelid.text import printable
 from annelid.textfiles import parse_xml, read_bytes
 
@@ -52,7 +52,7 @@ _SIMULATION = f"""<Lems>
 </ComponentType>
 </Lems>"""
 _FLAGS = {"true": True, "false": False}
-_TEXTS = {"name", "source", "target", "kind", "quantity", "targets"}
+_TEXTS = {"name", "source", "target", "kind", "targets"}
 _KEY = re.compile(r"(neuron|connection|input|output|channels|gates|targets)_([1-9]\d{0,6})(?:_(.+))?")
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 _IN_XML = re.compile("[\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]*")
@@ -186,8 +186,6 @@ def _tables(component: ET.Element) -> dict[str, Any]:
             if found is not None:
                 level.setdefault(found[1], {})[int(found[2])] = text
                 continue
-            if rest.startswith("firing_"):
-                level, rest = level.setdefault("firing", {}), rest.removeprefix("firing_")
             level[rest] = _value(rest, text, name)
         except (AttributeError, TypeError):
             raise ConfigError(f"attribute {shown(name)} of the network is none that annelid writes") from None
@@ -247,7 +245,6 @@ def _type(network: Network, fields: Mapping[str, Any]) -> ET.Element:
                 made, "Parameter", name=key, dimension=DIMENSIONS[unit][0] if (unit := _unit(key)) else "none"
             )
     ET.SubElement(made, "Constant", name="one_per_mV", dimension="per_voltage", value="1per_mV")
-    ET.SubElement(made, "Constant", name="one_ms", dimension="time", value="1ms")
     for number in range(1, len(network.neurons) + 1):
         ET.SubElement(made, "Exposure", name=f"neuron_{number}_v", dimension="voltage")
     made.append(_Dynamics(network).element)
@@ -260,32 +257,18 @@ class _Dynamics:
     def __init__(self, network: Network) -> None:
         self.element = ET.Element("Dynamics")
         self._states: list[tuple[str, str, str, str]] = []
-        self._events: list[tuple[str, dict[str, str]]] = []
         place = {name: f"neuron_{number}" for number, name in enumerate(network.neurons, start=1)}
         tables = network_tables(network)
         currents: dict[str, list[str]] = {name: [] for name in place.values()}
-        factors: dict[tuple[str, str], list[str]] = {}
-        resets = {place[name]: {f"{place[name]}_v": f"{place[name]}_firing_reset_mV"} for name in place}
         for number, each in enumerate(tables["connection"], start=1):
             here, pre, post = f"connection_{number}", place[each["source"]], place[each["target"]]
-            if each["kind"] in ("synapse", "modulatory_synapse"):
+            if each["kind"] == "synapse":
                 low = f"{here}_threshold_mV"
                 # LEMS has no minimum and no maximum, and its step H is not in all simulators.
                 self._derived(f"{here}_x", f"({pre}_v - {low}) / ({here}_saturation_mV - {low})")
                 self._derived(f"{here}_above_0", f"({here}_x + abs({here}_x)) / 2")
-                self._derived(f"{here}_open", _at_most_1(f"{here}_above_0"))
-            if each["kind"] == "synapse":
+                self._derived(f"{here}_open", f"({here}_above_0 + 1 - abs({here}_above_0 - 1)) / 2")
                 currents[post].append(f"{here}_conductance_uS * {here}_open * ({here}_reversal_mV - {post}_v)")
-            elif each["kind"] == "modulatory_synapse":
-                factors.setdefault((each["quantity"], post), []).append(f"({here}_factor ^ {here}_open)")
-            elif each["kind"] == "spiking_synapse":
-                # The time since the last spike is exact in Euler steps too, a decay by its rate would not be.
-                age, peak = f"{here}_age", f"{here}_peak"
-                self._state(peak, "none", "0", "0 / one_ms")
-                self._state(age, "time", "0 * one_ms", "1")
-                release = f"({peak} * exp((0 - {age}) / {here}_time_constant_ms))"
-                resets[pre] |= {peak: _at_most_1(f"({release} + {here}_increment)"), age: "0 * one_ms"}
-                currents[post].append(f"{here}_conductance_uS * {release} * ({here}_reversal_mV - {post}_v)")
             else:
                 difference = f"({pre}_v - {post}_v)"
                 if each["rectified"]:
@@ -297,22 +280,11 @@ class _Dynamics:
             for target in each["targets"]:
                 currents[place[target]].append(f"input_{number}_{INPUT_CURRENT}")
         for name, neuron in zip(place.values(), tables["neuron"], strict=True):
-            scaled = dict.fromkeys(get_args(Modulated), "1")
-            for quantity in scaled:
-                if (quantity, name) in factors:
-                    scaled[quantity] = f"{name}_{quantity}_factor"
-                    self._derived(scaled[quantity], " * ".join(factors[quantity, name]))
-            self._neuron(name, neuron, scaled, currents[name])
-            if neuron["firing"] is not None:
-                theta, firing = f"{name}_theta", f"{name}_firing"
-                above = f"{firing}_adaptation * ({name}_v - {name}_rest_mV)"
-                rate = f"({firing}_threshold_mV - {theta} + {above}) / {firing}_adaptation_time_constant_ms"
-                self._state(theta, "voltage", f"{firing}_threshold_mV", rate)
-                self._events.append((f"{name}_v .geq. {theta}", resets[name]))
+            self._neuron(name, neuron, currents[name])
         self._finish()
 
-    def _neuron(self, name: str, neuron: Mapping[str, Any], scaled: Mapping[str, str], currents: list[str]) -> None:
-        terms = [f"{name}_leak_conductance_uS * {scaled['leak']} * ({name}_rest_mV - {name}_v)", f"{name}_bias_nA"]
+    def _neuron(self, name: str, neuron: Mapping[str, Any], currents: list[str]) -> None:
+        terms = [f"{name}_leak_conductance_uS * ({name}_rest_mV - {name}_v)", f"{name}_bias_nA"]
         for number, channel in enumerate(neuron["channels"], start=1):
             here = f"{name}_channels_{number}"
             open_gates = []
@@ -322,20 +294,15 @@ class _Dynamics:
                 self._derived(f"{at}_closing", closing.format(f"{name}_v"))
                 value = f"(1 / (1 + {at}_closing))"
                 if gate["time_constant_ms"] is not None:
-                    tau = f"({at}_time_constant_ms * {scaled['gates']} * {value} * sqrt({at}_closing))"
+                    tau = f"({at}_time_constant_ms * {value} * sqrt({at}_closing))"
                     start = f"1 / (1 + {closing.format(f'{name}_initial_mV')})"
                     self._state(f"{at}_z", "none", start, f"({value} - {at}_z) / {tau}")
                     value = f"{at}_z"
                 open_gates.append(f"({value} ^ {at}_power)")
-            self._derived(f"{here}_open", " * ".join([scaled["channels"], *open_gates]))
+            self._derived(f"{here}_open", " * ".join(open_gates) or "1")
             terms.append(f"{here}_conductance_uS * {here}_open * ({here}_reversal_mV - {name}_v)")
         self._derived(f"{name}_current", " + ".join([*terms, *currents]), "current")
-        self._state(
-            f"{name}_v",
-            "voltage",
-            f"{name}_initial_mV",
-            f"{name}_current / ({name}_capacitance_nF * {scaled['membrane']})",
-        )
+        self._state(f"{name}_v", "voltage", f"{name}_initial_mV", f"{name}_current / {name}_capacitance_nF")
 
     def _state(self, name: str, dimension: str, start: str, rate: str) -> None:
         self._states.append((name, dimension, start, rate))
@@ -344,7 +311,7 @@ class _Dynamics:
         ET.SubElement(self.element, "DerivedVariable", name=name, dimension=dimension, value=value)
 
     def _finish(self) -> None:
-        """Writes states before what is derived of them, then rates, starts and events."""
+        """Writes states before what is derived of them, then rates and starts."""
         start = ET.Element("OnStart")
         for place, (name, dimension, first, rate) in enumerate(self._states):
             shown_as = {"exposure": name} if name.endswith("_v") else {}
@@ -352,11 +319,3 @@ class _Dynamics:
             ET.SubElement(start, "StateAssignment", variable=name, value=first)
             ET.SubElement(self.element, "TimeDerivative", variable=name, value=rate)
         self.element.append(start)
-        for test, assignments in self._events:
-            event = ET.SubElement(self.element, "OnCondition", test=test)
-            for variable, value in assignments.items():
-                ET.SubElement(event, "StateAssignment", variable=variable, value=value)
-
-
-def _at_most_1(value: str) -> str:
-    return f"({value} + 1 - abs({value} - 1)) / 2"

@@ -109,8 +109,8 @@ def export_network(network: Network) -> Any:
     Raises:
         MissingDependency: SNS-Toolbox or torch is not installed.
         ConfigError: Something the toolbox cannot express: two synapses between the same two neurons, an input into
-            several neurons, a neuron without leak, more than one instantaneous or two slow gates in a channel, spiking
-            neurons, or spiking or modulatory synapses; the sentence names it.
+            several neurons, a neuron without leak, or more than one instantaneous or two slow gates in a channel; the
+            sentence names it.
     """
     toolbox = _toolbox()
     if not network.neurons:
@@ -118,8 +118,6 @@ def export_network(network: Network) -> Any:
     exported = toolbox.networks.Network(name=network.name)
     n_channels = max(len(neuron.channels) for neuron in network.neurons.values())
     for name, neuron in network.neurons.items():
-        if neuron.firing is not None:
-            raise ConfigError(f"neuron {name!r} spikes; only non-spiking networks can go over to SNS-Toolbox")
         if neuron.leak_conductance_uS == 0:
             raise ConfigError(f"neuron {name!r} has no leak, and SNS-Toolbox divides by it")
         membrane: dict[str, Any] = {
@@ -141,14 +139,9 @@ def export_network(network: Network) -> Any:
             numbers = kind.conductance_uS, kind.reversal_mV, kind.threshold_mV, kind.saturation_mV
             names = "max_conductance", "reversal_potential", "e_lo", "e_hi"
             synapse = toolbox.connections.NonSpikingSynapse(**dict(zip(names, numbers, strict=True)))
-        elif isinstance(kind, GapJunction):
+        else:
             pair = (kind.rectified, source, target) if kind.rectified else (False, *sorted((source, target)))
             synapse = toolbox.connections.ElectricalSynapse(kind.conductance_uS, rect=kind.rectified)
-        else:
-            raise ConfigError(
-                f"{source!r} and {target!r} are joined by a {type(kind).__name__}; only graded synapses and gap "
-                "junctions can go over to SNS-Toolbox"
-            )
         pairs[pair] += 1
         exported.add_connection(synapse, source, target)
     for (_, source, target), count in pairs.items():

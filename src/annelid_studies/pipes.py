@@ -17,7 +17,8 @@ from annelid.draw import canvas, draw_lines, line_looks, panel_title, save_both
 from annelid.experiment import Case, Store
 from annelid.morphology import Array
 from annelid.simulation import Run
-from annelid_studies.tables import grouped, tabulated, terminal_table
+from annelid_studies.tables import Results, grouped, tabulated, terminal_table, write_fields
+from annelid_studies.worms import Effort
 
 PRESET = "riddle2025-muscles"
 CM = 100.0
@@ -30,13 +31,13 @@ QUICK_RADII_M = (0.3,)
 TURN_S = 0.27
 """Time from one segment to the next in bends: about that of the paper's network on this body on open ground."""
 TIMED = {"controller": {"kind": "timed", "rise_s": TURN_S, "hold_s": TURN_S, "fall_s": TURN_S, "interval_s": TURN_S}}
-LIFT, LET_GO_S = 0.45, 0.35
+LIFT, MOTOR_TIME_CONSTANT_S = 0.45, 0.35
 FIXED, ADAPTIVE = "fixed", "adaptive"
 SLOW_S, FAST_S = 45.0, 30.0
 
 
 def _robust(**changes: Any) -> dict[str, Any]:
-    return {"controller": {"kind": "sns-robust", "let_go_s": LET_GO_S, **changes}}
+    return {"controller": {"kind": "sns-robust", "motor_time_constant_s": MOTOR_TIME_CONSTANT_S, **changes}}
 
 
 BEND_GAITS: Mapping[str, Mapping[str, Any]] = {
@@ -156,6 +157,13 @@ def _course(run: Run, passage: Passage) -> Course:
     smooth = np.array([drive[np.abs(time - now) <= WINDOW_S / 2].mean() for now in passage.time_s])
     first_ring = np.interp(passage.time_s, time, rings[:, 0])
     return Course(passage.front_m, passage.bore_m[:, 0], passage.speed_over_m_per_s(WINDOW_S), smooth, first_ring)
+
+
+def study(store: Store, output: Path, effort: Effort) -> Results:
+    """The study `pipes`."""
+    readings, courses = pass_pipes(store, trials(effort == "quick"))
+    path = write_fields(Reading, readings, output / "pipes.csv")
+    return (path, pipes_picture(readings, courses, path.with_suffix(""))), [pipes_table(readings)]
 
 
 def pipes_table(readings: Sequence[Reading]) -> TerminalTable:

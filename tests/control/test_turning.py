@@ -7,14 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from circuits import controller
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from annelid.config import check_config, load_config
-from annelid.config.settings import StretchSensor as SensorSection
-from annelid.control import SnsController, TimedController
+from annelid.control import CircuitController, TimedController
 from annelid.control.open_loop import TimedWave
-from annelid.control.sns import Sns
 from annelid.control.turning import (
     ConstantTurning,
     CourseTurning,
@@ -71,9 +70,8 @@ def wave(n_segments: int = N) -> TimedController:
     return TimedController(TimedWave(rise_s=0.1, hold_s=0.1, fall_s=0.1, interval_s=0.1), n_segments, 2 * n_segments)
 
 
-def sns(n_segments: int = N) -> SnsController:
-    held = SensorSection(startup_hold_s=0.0)
-    return SnsController(Sns(), held, n_segments, 2 * n_segments, STEP_S)
+def sns(n_segments: int = N) -> CircuitController:
+    return controller(n_segments=n_segments, n_muscles=2 * n_segments)
 
 
 SECTIONS: list[TurningKind] = [
@@ -104,12 +102,12 @@ def journey(n_steps: int) -> list[Sensation]:
 class TestEveryKind:
     @pytest.mark.parametrize("pattern", [wave, sns])
     def test_a_stride_is_so_many_steps_bit_for_bit(self, section: TurningKind, pattern: Any) -> None:
-        walked, strode = turned(section, pattern()), turned(section, pattern())
+        stepped_on, strided = turned(section, pattern()), turned(section, pattern())
         for first in range(0, 400, 10):
             here = journey(400)[first]
-            stepped = [walked.step(replace(here, time_s=(first + later) * STEP_S)) for later in range(10)]
-            assert np.array_equal(stepped, strode.stride(here, 10))
-        before, after = walked.get_state(), strode.get_state()
+            stepped = [stepped_on.step(replace(here, time_s=(first + later) * STEP_S)) for later in range(10)]
+            assert np.array_equal(stepped, strided.stride(here, 10))
+        before, after = stepped_on.get_state(), strided.get_state()
         assert before.keys() == after.keys()
         assert all(np.array_equal(before[name], after[name], equal_nan=True) for name in before)
 

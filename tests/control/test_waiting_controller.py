@@ -7,36 +7,28 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from circuits import controller, felt
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from annelid.config import StretchSensor
-from annelid.control import SnsController
-from annelid.control.sns import Sns
-from annelid.control.waiting import WaitingController, WaitingSns
+from annelid.control import CircuitController
 from annelid.errors import ConfigError
 from annelid.nervous import Network, Neuron, PeristalsisParameters, Synapse, neuron_names, peristalsis_network
 from annelid.nervous.peristalsis import waiting_network
-from annelid.protocols import Array, Sensation
+from annelid.protocols import Array
 
 LONGEST_M, TOLERANCE_M, LAG_S = 0.06, 0.006, 0.06
-SENSOR = StretchSensor(tolerance_m=TOLERANCE_M)
+SENSOR = {"tolerance_m": TOLERANCE_M, "startup_hold_s": 0.2}
 Onset = tuple[float, int, Array]
 """Time of a contraction's begin, s, the segment, and all segments' lengthening then, m."""
 
 
-def waiting(n_segments: int = 4) -> WaitingController:
-    return WaitingController(WaitingSns(), SENSOR, n_segments, n_segments, 0.001)
-
-
-def felt(longer_m: Array, time_s: float) -> Sensation:
-    n = len(longer_m)
-    rest = np.full((n, 1), 0.07)
-    return Sensation(time_s, rest + longer_m[:, None], rest, np.ones(n), np.zeros(n), np.zeros((n, 3)), np.zeros(3))
+def waiting(n_segments: int = 4, **network: float) -> CircuitController:
+    return controller("sns-waiting", n_segments, sensor=SENSOR, network=network)
 
 
 def crawl(
-    controller: WaitingController | SnsController,
+    one: CircuitController,
     longest_m: Sequence[float],
     lag_s: float | Sequence[float] = LAG_S,
     duration_s: float = 10.0,
@@ -45,9 +37,9 @@ def crawl(
     longer = np.zeros(len(longest_m))
     onsets: list[Onset] = []
     trace = np.zeros((round(duration_s / 0.001), len(longest_m)))
-    controller.reset(0)
+    one.reset(0)
     for step in range(len(trace)):
-        trace[step] = controller.step(felt(longer, 0.001 * step))
+        trace[step] = one.step(felt(longer, 0.001 * step))
         before = trace[step - 1] if step else np.zeros_like(longer)
         begun = np.flatnonzero((trace[step] > 0.5) & (before <= 0.5))
         onsets += [(0.001 * step, int(segment), longer.copy()) for segment in begun]
@@ -169,8 +161,7 @@ def test_the_neurons_are_the_papers_and_a_memory_each(n_segments: int) -> None:
 
 
 def test_the_network_has_the_parameters_of_its_section() -> None:
-    slower = WaitingSns(network=Sns(gate_time_constant_ms=600.0))
-    found = WaitingController(slower, SENSOR, 4, 4, 0.001).network
+    found = waiting(gate_time_constant_ms=600.0).circuit.network
     assert found.to_toml() == waiting_network(4, PeristalsisParameters(gate_time_constant_ms=600.0)).to_toml()
     assert found.to_toml() != waiting_network(4).to_toml()
 

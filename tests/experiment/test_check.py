@@ -12,15 +12,13 @@ from hypothesis import strategies as st
 
 from annelid.config import load_config
 from annelid.errors import ConfigError
-from annelid.experiment import check as package
+from annelid.experiment import store
 from annelid.experiment.check import HALF, MORE, RESOLVED, Check, check, compare, refinements
 from annelid.experiment.outcome import Outcome, outcome
+from annelid.experiment.store import Done
 from annelid.output import write_json
-from annelid.simulation import Run, simulate
-from annelid.simulation.runfile import open_run
+from annelid.simulation import Run
 from annelid.textfiles import read_json
-
-PLANAR = {"duration_s": 3.0}
 
 
 @pytest.fixture(scope="module")
@@ -32,21 +30,21 @@ def of(run: Outcome, **numbers: Any) -> Outcome:
     return replace(run, summary=replace(run.summary, **numbers))
 
 
-def compared(run: Outcome, **numbers: Any) -> Check:
+def compared(run: Outcome, finer: Done) -> Check:
     (half, *_), left_out = refinements(load_config("riddle2022-planar"))
-    return compare(run, {half: of(run, **numbers)}, left_out)
+    return compare(run, {half: finer}, left_out)
 
 
 def test_rods_are_refined_in_step_and_mesh_and_others_say_what_is_left() -> None:
     (half, more), left_out = refinements(load_config("riddle2023-rods"))
     assert (half.name, half.changes["clock.physics_timestep_s"]) == (HALF, 0.005)
     assert (more.name, more.changes) == (MORE, {"body.mesh.elements_per_side": 3})
-    assert left_out == ()
+    assert left_out == ""
     for preset, words in (
         ("riddle2023", "A chain keeps the paper's elements"),
         ("riddle2022-planar", "has no elements"),
     ):
-        (only,), (sentence,) = refinements(load_config(preset))
+        (only,), sentence = refinements(load_config(preset))
         assert only.name == HALF
         assert words in sentence
 
@@ -62,59 +60,50 @@ def test_a_step_whose_half_does_not_fit_is_refused_with_the_nearest_that_do() ->
 def test_a_number_moves_by_its_relative_change_and_a_share_by_its_own(planar: Outcome, factor: float) -> None:
     assume(abs(abs(factor - 1.0) - RESOLVED) > 1e-9)
     assert planar.summary.period_s is not None
-    found = compared(planar, period_s=factor * planar.summary.period_s)
+    found = compared(planar, Done(of(planar, period_s=factor * planar.summary.period_s)))
     assert found.largest("period_s") == pytest.approx(abs(factor - 1.0))
     assert found.resolved == (abs(factor - 1.0) < RESOLVED)
     assert found.sentence.startswith("Resolved" if found.resolved else "Not resolved")
     assert ("not resolved" in found.cell("period_s")) != found.resolved
-    share = compared(of(planar, middle_deficit_mean=0.01), middle_deficit_mean=0.01 + 0.02 * factor)
+    share = compared(of(planar, middle_deficit_mean=0.01), Done(of(planar, middle_deficit_mean=0.01 + 0.02 * factor)))
     assert share.largest("middle_deficit_mean") == pytest.approx(0.02 * factor)
 
 
-def test_what_is_lost_or_in_another_order_is_said(planar: Outcome) -> None:
-    lost = compared(planar, period_s=None)
+def test_what_is_lost_or_in_another_order_is_said(planar: Outcome, tmp_path: Path) -> None:
+    lost = compared(planar, Done(of(planar, period_s=None)))
     assert lost.cell("period_s") == "lost\nnot resolved"
-    assert "mean interval between contractions" in lost.sentence
+    assert "period (lost)" in lost.sentence
     assert "Try --set clock.physics_timestep_s=0.0005" in lost.sentence
-    other = compared(planar, wave=not planar.summary.wave)
-    assert not other.resolved
-    assert "the order of contractions is another one with half the step" in other.sentence
-    (half, *_), _ = refinements(load_config("riddle2022-planar"))
-    stopped = compare(planar, {half: replace(planar, message="edge strain is 0.1")})
-    assert "is stopped (edge strain is 0.1)" in stopped.sentence
-    assert "fails (no memory)" in compare(planar, {half: "no memory"}).sentence
-
-
-def test_what_is_lost_is_null_in_json(planar: Outcome, tmp_path: Path) -> None:
-    written = write_json(tmp_path / "check.json", compared(planar, period_s=None).to_dict())
-    assert read_json(written)["moved"]["period_s"] == {HALF: None}
+    assert read_json(write_json(tmp_path / "check.json", lost.to_dict()))["moved"]["period_s"] == {HALF: None}
+    for finer, words in (
+        (Done(of(planar, wave=not planar.summary.wave)), "the order of contractions is another one with half the step"),
+        (Done(replace(planar, message="edge strain is 0.1")), "is stopped (edge strain is 0.1)"),
+        (Done(None, ConfigError("no solution")), "fails (no solution)"),
+    ):
+        found = compared(planar, finer)
+        assert not found.resolved
+        assert words in found.sentence
 
 
 @pytest.mark.usefixtures("runs_in_this_process")
-def test_a_planar_worm_is_checked_and_a_second_call_computes_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_a_checked_run_is_the_plain_run_and_a_second_call_computes_nothing(
+    planar_run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    config = load_config("riddle2022-planar", PLANAR)
-    run, found = check(config, tmp_path, jobs=1)
+    config = planar_run.config
+    run, found = check(config, tmp_path)
     assert (run.status, run.path) == ("complete", tmp_path / "run.nc")
+    assert run.data.drop_vars("wall_time").equals(planar_run.data.drop_vars("wall_time"))
     assert found.resolved, "the rhythm of this worm converges as its steps go to zero"
-    assert 0.0 < (found.largest("period_s") or 0.0) < 0.01
-    monkeypatch.setattr(package, "simulate", None)
-    again, same = check(config, tmp_path, jobs=1)
+    assert 0.0 < found.largest("period_s") < 0.01
+    monkeypatch.setattr(store, "attempt", None)
+    again, same = check(config, tmp_path)
     assert (again.config, same.to_dict()) == (run.config, found.to_dict())
     with pytest.raises(ConfigError, match="has another run in it"):
         check(load_config("riddle2022-planar", {"duration_s": 2.0}), tmp_path)
 
 
-@pytest.mark.usefixtures("runs_in_this_process")
-def test_an_interruption_keeps_the_run_itself(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    config = load_config("riddle2022-planar", {"duration_s": 0.5})
-    whole = simulate
-
-    def stopped_soon(*given: Any, **options: Any) -> Run:
-        return replace(whole(*given, **options), status="interrupted")
-
-    monkeypatch.setattr(package, "simulate", stopped_soon)
-    with pytest.raises(KeyboardInterrupt):
-        check(config, tmp_path, jobs=1)
-    assert open_run(tmp_path).data["time"][-1] == pytest.approx(0.5)
+def test_a_folder_in_use_is_refused_and_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("mine")
+    with pytest.raises(ConfigError, match="is not empty"):
+        check(load_config("riddle2022-planar"), tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["notes.txt"]

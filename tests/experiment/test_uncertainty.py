@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 import statistics
 import tempfile
 from collections.abc import Mapping
@@ -16,30 +17,28 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import annelid
-from annelid.analysis import summary
-from annelid.config import RunConfig, load_config
+from annelid.config import field_value, load_config
 from annelid.errors import ConfigError, SimulationStopped
-from annelid.experiment import uncertainty as study
 from annelid.experiment.case import Case
+from annelid.experiment.outcome import outcome
 from annelid.experiment.spread import ABSENT, CALIBRATION, EXACT, FIELDS, UNMEASURED, applicable, changes, draw
 from annelid.experiment.uncertainty import (
     Quantity,
     Spread,
     Uncertainty,
-    VariantRun,
-    combine,
-    finer_steps,
-    more_elements,
     plan,
+    quantity_of,
     read_spread,
     readings,
     uncertainty,
     uncertainty_table,
     write_uncertainty,
 )
+from annelid.experiment.variants import finer_steps, more_elements
 from annelid.simulation.loop import simulate
 from annelid.simulation.runfile import open_run
 from annelid_studies.worms import RODS
+from outcome import Command
 
 pytestmark = pytest.mark.usefixtures("runs_in_this_process")
 
@@ -50,10 +49,6 @@ NOTHING: dict[str, float] = {"young_modulus": 0.0, "dry_friction": 0.0, "cable_f
 def spread(errors: Mapping[str, float], correlation: Any = None, exponent: float | None = None) -> Spread:
     matrix = np.eye(len(errors)) if correlation is None else np.asarray(correlation, dtype=float)
     return Spread(tuple(errors), np.array(list(errors.values())), matrix, "a test", exponent)
-
-
-def variant(config: RunConfig, changed: Mapping[str, Any]) -> Case:
-    return Case(config.name, changed, config)
 
 
 # The draw
@@ -190,15 +185,6 @@ def test_the_fit_that_comes_along_is_whole() -> None:
     assert known.cable_exponent == content["parameters"]["cable_friction"]["value"]
 
 
-def test_another_fit_is_read_as_it_was_written(tmp_path: Path) -> None:
-    path = tmp_path / "mine.json"
-    path.write_text(json.dumps(calibration()))
-    mine, ours = read_spread(path), read_spread()
-    assert mine.names == ours.names
-    assert (mine.correlation == ours.correlation).all()
-    assert mine.source == str(path)
-
-
 def test_a_damaged_fit_is_refused(subtests: pytest.Subtests, tmp_path: Path) -> None:
     for damage, says in (
         (lambda c: c["parameters"]["dry_friction"].update(relative_error=None), "does not determine dry_friction"),
@@ -217,9 +203,7 @@ def test_a_damaged_fit_is_refused(subtests: pytest.Subtests, tmp_path: Path) -> 
                 read_spread(path)
 
 
-def test_a_missing_or_garbled_fit_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match="cannot read"):
-        read_spread(tmp_path / "none.json")
+def test_what_is_no_fit_is_refused(tmp_path: Path) -> None:
     for text, says in (("{", "not valid JSON"), ("[]", r"no calibration\.json"), ("3", r"no calibration\.json")):
         (tmp_path / "bad.json").write_text(text)
         with pytest.raises(ConfigError, match=says):
@@ -294,48 +278,28 @@ def test_finer_steps_fit_the_control_step(control_ms: int, ratio: int, faster: b
 
 
 def test_elements_end_where_the_mesh_does() -> None:
-    assert [*map(list, map(dict.values, more_elements(load_config(RODS))))] == [[3], [4]]
-    assert more_elements(load_config(RODS, {"body.mesh.elements_per_side": 31})) == [32]
-    assert more_elements(load_config("riddle2023")) == [4, 5]
+    field = "body.mesh.elements_per_side"
+    assert more_elements(load_config(RODS)) == [{field: 3}, {field: 4}]
+    assert more_elements(load_config(RODS, {field: 31})) == [{field: 32}]
 
 
 def test_a_plan_changes_only_what_it_says() -> None:
     # A quarter of this step is a whole number of control steps.
     config = load_config(RODS, {"clock.physics_timestep_s": 0.02})
-    known, _ = applicable(config, read_spread())
-    planned = plan(config, 4, known)
-    assert [kind for kind, _ in planned] == ["nominal", *["drawn"] * 4, *["time step"] * 2, *["elements"] * 2]
-    for one in (variant(config, changed) for _, changed in planned):
-        sections = {path: getattr_path(one.config, path) for path in one.changes}
-        assert sections == one.changes
-        back = {path: getattr_path(config, path) for path in one.changes}
-        assert load_config(one.config.model_dump(), back) == config
+    planned = plan(config, 4, applicable(config, read_spread())[0])
+    assert {kind: len(of_kind) for kind, of_kind in planned.items()} == {"parameters": 4, "time step": 2, "elements": 2}
+    for changed in (one for of_kind in planned.values() for one in of_kind):
+        varied = Case(config.name, changed, config).config
+        assert {path: field_value(varied, path) for path in changed} == changed
+        back = {path: field_value(config, path) for path in changed}
+        assert load_config(varied.model_dump(), back) == config
 
 
-def getattr_path(config: RunConfig, path: str) -> Any:
-    value: Any = config
-    for key in path.split("."):
-        value = getattr(value, key)
-    return value
-
-
-def done(kind: Any, value: float | None, message: str = "") -> VariantRun:
-    return VariantRun(kind, {}, Path(), "ordered", "", message, {"period_s": value})
-
-
-def test_runs_that_were_stopped_have_no_part_in_the_errors(tiny: Uncertainty) -> None:
-    nominal = {"period_s": readings(summary(open_run(tiny.folder)))["period_s"]}
-    runs = [
-        done("drawn", 1.0),
-        done("drawn", 3.0),
-        done("drawn", 99.0, "too much energy"),
-        done("time step", 99.0, "too much energy"),
-        done("elements", 2.0),
-    ]
-    [found] = combine(nominal, runs)
+def test_errors_are_the_scatter_of_samples_and_the_largest_difference_of_finer_runs() -> None:
+    found = quantity_of("period_s", 1.5, {"parameters": [1.0, 3.0, None], "time step": [None], "elements": [2.0, 1.2]})
     assert found.parameters == pytest.approx(sqrt(2.0))
-    assert found.n_drawn == 2
-    assert found.time_step is None
+    assert (found.n_samples, found.time_step, found.elements) == (2, None, 0.5)
+    assert quantity_of("period_s", None, {"parameters": [1.0], "time step": [1.0], "elements": []}).total is None
 
 
 @pytest.fixture(scope="module")
@@ -351,25 +315,16 @@ def test_the_run_itself_is_the_plain_run(tiny: Uncertainty, tmp_path: Path) -> N
 
 
 def test_error_bars_are_those_of_the_runs(tiny: Uncertainty) -> None:
-    """The force of a ring pulls from the start, and so do the drawn differences of it."""
-    force = {kind: [reading_of(run, "contraction_force_median_N") for run in tiny.of(kind)] for kind in KINDS}
-    [found] = [each for each in tiny.quantities if each.name == "contraction_force_median_N"]
-    [nominal] = force["nominal"]
-    assert found.value == nominal
-    assert found.parameters == pytest.approx(abs(force["drawn"][0] - force["drawn"][1]) / sqrt(2.0))
-    assert found.time_step == max(abs(nominal - other) for other in force["time step"])
-    assert found.discretization == max(abs(nominal - other) for other in force["elements"])
+    """The force of a ring pulls from the start, and so do the sampled differences of it."""
+    name = "contraction_force_median_N"
+    force = {
+        kind: [readings(outcome(open_run(done.outcome.path)))[name] for _, done in of_kind if done.outcome]
+        for kind, of_kind in tiny.variants.items()
+    }
+    [found] = [each for each in tiny.quantities if each.name == name]
+    assert found.value == readings(outcome(open_run(tiny.folder)))[name] is not None
+    assert found == quantity_of(name, found.value, force)
     assert all(error is not None and error > 0.0 for error in found.errors.values())
-
-
-KINDS = ("nominal", "drawn", "time step", "elements")
-
-
-def reading_of(run: VariantRun, name: str) -> float:
-    """Reads the run's file anew."""
-    value = readings(summary(open_run(run.path)))[name]
-    assert value is not None
-    return value
 
 
 def test_files_tell_all_and_are_json_csv_and_a_picture(tiny: Uncertainty) -> None:
@@ -377,12 +332,12 @@ def test_files_tell_all_and_are_json_csv_and_a_picture(tiny: Uncertainty) -> Non
     content = json.loads(json_path.read_text(encoding="utf-8"))
     assert len(content["runs"]) == 7
     assert all((tiny.folder / run["path"] / "run.nc").exists() for run in content["runs"])
-    assert content["too_short_to_tell"] == 2
+    assert content["samples"] == "0 of 2 Monte Carlo samples kept an ordered rhythm (2 too short to tell)"
     lines = csv_path.read_text(encoding="utf-8").splitlines()
     assert len(lines) == 1 + len(content["quantities"])
     assert png_path.read_bytes().startswith(b"\x89PNG")
     table = uncertainty_table(tiny)
-    assert "0 of 2 Monte Carlo samples kept an ordered rhythm (2 too short to tell)" in str(table.title)
+    assert content["samples"] in str(table.title)
     words = str(table.caption)
     assert "20 ms against 10 and 5 ms; elements a side: 2 against 3 and 4" in words
     assert f"dry_friction, softening_strain, spring_rest_length, viscous_friction ({ABSENT})" in words
@@ -396,28 +351,11 @@ def test_no_error_of_the_parameters_is_no_error_bar_and_costs_no_run(tiny: Uncer
     before = files(tiny.folder)
     exact = uncertainty(tiny.config, 3, tiny.folder, spread=read_spread().but(NOTHING), jobs=1)
     assert files(tiny.folder) == before
-    assert len(exact.of("drawn")) == 3
+    assert len(exact.variants["parameters"]) == 3
     told = [each for each in exact.quantities if each.value is not None]
     assert [each.parameters for each in told] == [0.0] * len(told)
     for ours, theirs in zip(exact.quantities, tiny.quantities, strict=True):
-        assert (ours.time_step, ours.discretization) == (theirs.time_step, theirs.discretization)
-
-
-def test_an_interrupted_study_goes_on(tmp_path: Path) -> None:
-    config, folder = load_config(RODS, SHORT | {"body.mesh.elements_per_side": 1}), tmp_path / "run"
-
-    def stop_after_two(_stage: str, finished: int, _total: int, _share: float) -> None:
-        if finished >= 2:
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        uncertainty(config, 2, folder, jobs=1, progress=stop_after_two)
-    kept = {path: stamp for path, stamp in files(folder).items() if (path.parent / "outcome.json").exists()}
-    assert len(kept) >= 2
-    found = uncertainty(config, 2, folder, jobs=1)
-    after = files(folder)
-    assert {path: after[path] for path in kept} == kept
-    assert len(after) == len(found.runs) == 7
+        assert (ours.time_step, ours.elements) == (theirs.time_step, theirs.elements)
 
 
 @pytest.mark.parametrize(
@@ -434,24 +372,82 @@ def test_what_cannot_have_error_bars_is_refused(preset: str, n: int, says: str, 
     assert not (tmp_path / "run").exists()
 
 
-def test_a_folder_in_use_is_refused_and_left_alone(tiny: Uncertainty, tmp_path: Path) -> None:
-    (tmp_path / "notes.txt").write_text("mine")
-    with pytest.raises(ConfigError, match="is not empty"):
-        uncertainty(tiny.config, 2, tmp_path)
-    assert [path.name for path in tmp_path.iterdir()] == ["notes.txt"]
-    other = load_config(tiny.config.model_dump(), {"arena.friction": 0.5})
-    before = files(tiny.folder)
-    with pytest.raises(ConfigError, match="has another run in it"):
-        uncertainty(other, 2, tiny.folder)
-    assert files(tiny.folder) == before
-    assert open_run(tiny.folder).config == tiny.config
-
-
 def test_a_run_that_a_guard_stops_has_no_error_bars_but_its_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(study, "plan", lambda config, n, spread: [("nominal", {})])
+    monkeypatch.setattr("annelid.experiment.uncertainty.plan", lambda *_: {})
     config = load_config(RODS, SHORT | {"guard.edge_strain": 1e-6})
     with pytest.raises(SimulationStopped, match="strain"):
-        uncertainty(config, 2, tmp_path / "run", jobs=1)
+        uncertainty(config, 2, tmp_path / "run")
     assert open_run(tmp_path / "run").status == "stopped_by_guard"
+
+
+def test_a_variant_that_fails_is_named_and_has_no_part_in_the_errors(
+    tiny: Uncertainty, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    planned = {kind: [changed for changed, _ in of_kind] for kind, of_kind in tiny.variants.items()}
+    planned["parameters"] += [{"body.strands.young_modulus_Pa": -1.0}, {"guard.edge_strain": 1e-6}]
+    monkeypatch.setattr("annelid.experiment.uncertainty.plan", lambda *_: planned)
+    found = uncertainty(tiny.config, 4, tiny.folder)
+    assert found.quantities == tiny.quantities
+    words = str(uncertainty_table(found).caption)
+    assert "failed, no part in the errors: parameters young_modulus_Pa = -1: " in words
+    assert "stopped, no part in the errors: parameters edge_strain = 1e-06: " in words
+
+
+def test_an_interrupted_study_names_the_command_that_goes_on(annelid: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[dict[str, Any]] = []
+
+    def interrupted(config: object, n: int, folder: Path, **options: Any) -> None:
+        seen.append({"config": config, "n": n, "folder": folder, "errors": options["spread"].relative_error.tolist()})
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("annelid.experiment.uncertainty.uncertainty", interrupted)
+    words = ("--segments", "4", "--set", "controller={kind='sns-robust'}", "--vary", "floor_friction=0.2")
+    done = annelid("run", RODS, *words, "--seed", "5", "--uncertainty", "3", "-o", "my walk")
+    assert done.exit_code == 130
+    sentence = done.sentence()
+    assert "finished runs are kept in my walk" in sentence
+    program, *again = shlex.split(sentence.partition("go on with: ")[2])
+    assert program == "annelid"
+    annelid(*again)
+    assert seen[0] == seen[1]
+    # A folder that was found for it is named, so that the command goes on there.
+    sentence = annelid("run", RODS, "--uncertainty", "3").sentence()
+    again = shlex.split(sentence.partition("go on with: ")[2])
+    assert again[-2:] == ["--out", str(seen[-1]["folder"])]
+
+
+def test_bad_input_ends_in_one_sentence_and_leaves_nothing(annelid: Command, subtests: pytest.Subtests) -> None:
+    short = ("--uncertainty", "2", "--duration", "0.1")
+    for arguments, says in (
+        (("riddle2022-planar", *short), "body.kind = 'riddle2022' has no calibrated parameters"),
+        ((RODS, *short, "--vary", "floor_frction=0.1"), "did you mean 'floor_friction'"),
+        ((RODS, *short, "--vary", "floor_friction=much"), "the relative error must be a number"),
+        ((RODS, *short, "--vary", "floor_friction=true"), "the relative error must be a number"),
+        ((RODS, *short, "--uncertainty-from", "none.json"), "cannot read none.json"),
+        (("--uncertainty", "1"), "greater than or equal to 2"),
+        (("--vary", "spring_rate=0.1"), "need --uncertainty"),
+        (("--jobs", "2"), "--jobs needs --check or --uncertainty"),
+        (("--uncertainty-from", "c.json"), "need --uncertainty"),
+        (("--uncertainty", "2", "--resume", "walk"), "does not go with --resume"),
+        (("--check", "--uncertainty", "4"), "--uncertainty has what --check does"),
+        (("--check", "--resume", "walk"), "makes whole runs"),
+    ):
+        with subtests.test(says):
+            done = annelid("run", *arguments)
+            assert done.exit_code == 2
+            assert says in " ".join(done.err.split())
+            assert not list(Path().iterdir())
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_a_checked_run_says_how_far_its_numbers_move(annelid: Command) -> None:
+    command = ("run", "riddle2022-planar", "--duration", "3", "--check", "--jobs", "1", "-o", "walk")
+    done = annelid(*command)
+    assert done.exit_code == 0, done.err
+    assert "moves by" in done.out
+    assert "Resolved: with half the step (0.5 ms) no number moves by more than 10 %" in " ".join(done.out.split())
+    content = json.loads(annelid(*command, "--json").out)["results"]["check.json"]
+    assert content == json.loads(Path("walk/check.json").read_text())
+    assert content["resolved"] is True

@@ -1,26 +1,23 @@
 from __future__ import annotations
 
-from math import sqrt
+from math import nan, sqrt
 from pathlib import Path
 
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from annelid.draw.figures import experiments as figures
-from annelid.draw.figures.experiments import Panel, uncertainty_figure
-
-PANEL = Panel("length (cm)", ["1", "2"], [8.0, 7.0], {"a": [0.3, 0.1], "b": [0.4, None], "c": [1.2, 0.0]})
+from annelid.draw.figures.experiments import _draw_nested, uncertainty_figure
 
 
 def test_bars_are_nested_and_end_at_the_root_of_the_sum_of_squares() -> None:
+    values = np.array([8.0, 7.0])
     axes = Figure().subplots()
-    figures._draw(axes, PANEL)
+    _draw_nested(axes, values, {"a": np.array([0.3, 0.1]), "b": np.array([0.4, nan]), "c": np.array([1.2, 0.0])})
     ends: list[list[float]] = [[], []]
     for bars in axes.collections:
         for (place, low), (_, high) in bars.get_segments():  # type: ignore[attr-defined]
-            value = PANEL.values[round(place)]
-            assert value is not None
+            value = values[round(place)]
             ends[round(place)].append(max(abs(low - value), abs(high - value)))
     # Two pieces of every bar, one up and one down.
     assert sorted(ends[0]) == pytest.approx([0.3, 0.3, sqrt(0.25), sqrt(0.25), 1.3, 1.3])
@@ -32,12 +29,12 @@ def test_bars_are_nested_and_end_at_the_root_of_the_sum_of_squares() -> None:
 
 def test_a_tiny_error_does_not_blow_up_the_axis() -> None:
     axes = Figure().subplots()
-    figures._draw(axes, Panel("period (s)", [""], [2.631], {"a": [1e-9], "b": [None], "c": [0.0]}))
+    _draw_nested(axes, np.array([2.631]), {"a": np.array([1e-9]), "b": np.array([nan]), "c": np.array([0.0])})
     assert np.ptp(axes.get_ylim()) >= 0.02 * 2.631 * (1 - 1e-9)
 
 
 @pytest.mark.parametrize("value", [2.6, None])
 def test_a_picture_is_written_whether_or_not_there_is_a_value(value: float | None, tmp_path: Path) -> None:
-    panel = Panel("period (s)", [""], [value], {"a": [0.1], "b": [None], "c": [None]})
-    path = uncertainty_figure([PANEL, panel], tmp_path / "u.png")
-    assert path.read_bytes().startswith(b"\x89PNG")
+    names = ("elongation_mean_max_m.1", "period_s", "travel_m")
+    rows = {name: {"value": value, "parameters": 0.1, "time_step": None, "elements": None} for name in names}
+    assert uncertainty_figure(rows, tmp_path / "u.png").read_bytes().startswith(b"\x89PNG")

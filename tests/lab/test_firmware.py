@@ -36,10 +36,10 @@ WAYPOINTS = [[-1.0, 0.1], [-2.0, 1.0]]
 WORMS: dict[str, tuple[str, dict[str, Any]]] = {
     "sns": ("riddle2023-rods", {"controller": {"kind": "sns"}}),
     "linear": ("riddle2022-planar", {}),
-    "adaptive": ("riddle2023-rods", {"controller": {"kind": "adaptive", "drive": 0.2, "drive_slope_per_s": 0.1}}),
+    "adaptive": ("riddle2023-rods", {"controller": {"kind": "adaptive", "drive": 0.2}}),
     "pressure": ("riddle2023-rods", {"controller": {"kind": "sns-pressure"}}),
     "waiting": ("riddle2023-rods", {"controller": {"kind": "sns-waiting"}}),
-    "robust": ("riddle2023-rods", {"controller": {"kind": "sns-robust", "scheme": "heun"}}),
+    "robust": ("riddle2023-rods", {"controller": {"kind": "sns-robust"}}),
     "driven": ("riddle2025-adaptive", {}),
     "constant": ("riddle2025-3x1", {"controller": {"kind": "sns"}, "turning.modulation": -0.6}),
     "heading": ("riddle2025-steered", {"controller": {"kind": "sns-robust"}}),
@@ -245,7 +245,7 @@ def test_a_hostile_network_compiles(tmp_path: Path) -> None:
 def test_the_papers_networks_give_the_same_bits_for_100_000_steps(
     worm: str, benchmark: ModuleType, exactly: Callable[..., float], tmp_path: Path
 ) -> None:
-    network = controller_of(worm).network
+    network = controller_of(worm).circuit.network
     assert exactly(network, tmp_path, 100_000) == 0.0
     assert benchmark.largest_difference(network, tmp_path, 100_000, ordered=False) < 1e-8
 

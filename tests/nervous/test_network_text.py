@@ -10,13 +10,10 @@ from hypothesis import strategies as st
 from annelid.errors import ConfigError
 from annelid.nervous import (
     Channel,
-    Firing,
     GapJunction,
     Gate,
-    ModulatorySynapse,
     Network,
     Neuron,
-    SpikingSynapse,
     Synapse,
 )
 
@@ -25,18 +22,11 @@ positive = st.floats(1e-300, 1e300)
 conductance = st.floats(0, 1e300)
 gate = st.builds(Gate, any_float, any_float, positive, any_float, st.none() | positive)
 channel = st.builds(Channel, conductance, any_float, st.lists(gate, max_size=3).map(tuple))
-firing = st.builds(
-    lambda reset, above, m, tau: Firing(above, reset, m, tau), st.floats(-9, 0), st.floats(1, 9), any_float, positive
-)
-neuron = st.builds(
-    Neuron, positive, conductance, any_float, any_float, st.lists(channel, max_size=2).map(tuple), st.none() | firing
-)
+neuron = st.builds(Neuron, positive, conductance, any_float, any_float, st.lists(channel, max_size=2).map(tuple))
 ends = st.floats(-50, 0), st.floats(1, 50)
 kind = st.one_of(
     st.builds(Synapse, conductance, any_float, *ends),
     st.builds(GapJunction, conductance, st.booleans()),
-    st.builds(SpikingSynapse, conductance, any_float, positive, st.floats(0.01, 1)),
-    st.builds(ModulatorySynapse, st.sampled_from(["leak", "channels", "membrane", "gates"]), positive, *ends),
 )
 # All characters that text can hold, quotes, line ends and delete among them.
 words = st.text(st.characters(exclude_categories=["Cs"]) | st.sampled_from('"\\\n\r\t\x00\x7f|#='), max_size=8)
@@ -53,7 +43,7 @@ def networks(draw) -> Network:
         for source, target, what in draw(st.lists(st.tuples(name, name, kind), max_size=5)):
             if isinstance(what, GapJunction):
                 network.add_gap_junction(source, target, what)
-            elif not isinstance(what, SpikingSynapse) or network.neurons[source].firing is not None:
+            else:
                 network.add_synapse(source, target, what)
         for entry in draw(st.lists(words, max_size=2, unique=True)):
             network.add_input(entry, draw(st.lists(name, max_size=3)))
@@ -116,11 +106,12 @@ def test_faulty_texts_are_refused(subtests: pytest.Subtests) -> None:
         ("[[neuron]]\nname = 'a'\nrest_mV = true", "rest_mV must be a number, not True"),
         ("[[neuron]]\nname = 'a'\ncapacitance_nF = -1", r"neuron 1 \('a'\): .*capacitance_nF must be positive"),
         ("[[neuron]]\nname = 'a'\nchannels = 1", "channels must be an array of tables"),
-        ("[[neuron]]\nname = 'a'\nfiring = 1", "firing must be a table"),
+        ("[[neuron]]\nname = 'a'\nfiring = 1", "firing has been removed"),
         ("[[neuron]]\nname = 'a'\n[[neuron.channels]]\nreversal_mV = 1", "conductance_uS is missing"),
         ("[[neuron]]\nname = 'a'\n[[neuron]]\nname = 'a'", "'a' exists already"),
         ("[[connection]]\nsource = 'a'\ntarget = 'a'\nkind = 'synaps'", "did you mean 'synapse'"),
         ("[[connection]]\nsource = 'a'\ntarget = 'a'\nkind = 'synapse'", "conductance_uS is missing"),
+        ("[[connection]]\nsource = 'a'\ntarget = 'a'\nkind = 'spiking_synapse'", "has been removed"),
         ("[[input]]\nname = 'i'\ntargets = 'a'", "targets must be a list of names"),
         ("[[input]]\nname = 'i'\ntargets = ['b']", "unknown neuron 'b'"),
         ("[[output]]\nname = 'o'", "output 1 .'o'.: source is missing"),
@@ -138,11 +129,10 @@ def test_faulty_texts_are_refused(subtests: pytest.Subtests) -> None:
 def small_network() -> Network:
     network = Network("a & b <small>")
     network.add_neuron("up", Neuron(channels=(Channel(1.0, 110.0, (Gate(0.1, time_constant_ms=300.0),)),)))
-    network.add_neuron("down|side", Neuron(firing=Firing(5.0, adaptation=0.5)))
+    network.add_neuron("down|side", Neuron())
     network.add_neuron('say "x"', Neuron(rest_mV=-60.0))
     network.add_synapse("up", "down|side", Synapse(0.5, 194.0))
-    network.add_synapse("down|side", "up", SpikingSynapse(0.25, -40.0))
-    network.add_synapse('say "x"', "up", ModulatorySynapse("gates", 3.0))
+    network.add_synapse("down|side", "up", Synapse(0.25, -40.0))
     network.add_synapse("up", 'say "x"', Synapse(0.125, -50.0))
     network.add_gap_junction("up", 'say "x"', GapJunction(0.75, rectified=True))
     network.add_gap_junction("down|side", 'say "x"', GapJunction(0.75))
@@ -155,9 +145,8 @@ def small_network() -> Network:
 def test_table_lists_all_with_units_and_escapes_bars():
     table = small_network().table()
     assert "| neuron | C (nF) | Gm (uS) | rest (mV) | bias (nA) | start (mV) | also |" in table
-    assert "| down\\|side | 5 | 1 | 0 | 0 | 0 | fires at 5 mV, reset to 0 mV, adaptation 0.5 |" in table
+    assert "| down\\|side | 5 | 1 | 0 | 0 | 0 |  |" in table
     assert "| up | down\\|side | excitatory | 0.5 | 194 | 0 to 20 mV |" in table
-    assert '| say "x" | up | modulatory |  |  | gates × 3, 0 to 20 mV |' in table
     assert "| stimulus | up, down\\|side |" in table
     for line in table.splitlines():
         if line.startswith("|"):

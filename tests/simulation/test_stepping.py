@@ -10,7 +10,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from annelid.config import RunConfig, load_config
-from annelid.control import SnsController
 from annelid.errors import SimulationStopped
 from annelid.protocols import Array, MultiRatePlant, Plant, Sensation
 from annelid.simulation import build_controller, build_plant, simulate
@@ -71,7 +70,7 @@ def toy_config(move_every: int, **changes: object) -> RunConfig:
 
 
 def coupled(config: RunConfig, plant: Plant) -> Simulation:
-    return start(config, plant, SnsController(config.controller, config.sensor, N, N, 0.001), None)  # type: ignore[arg-type]
+    return start(config, plant, config.controller.build(config, plant), None)  # type: ignore[arg-type]
 
 
 @settings(max_examples=40)

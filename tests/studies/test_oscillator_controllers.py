@@ -12,17 +12,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from annelid.analysis import rhythm_score
-from annelid.config import RunConfig, StretchSensor, load_config
-from annelid.control import AdaptiveController, SineController, TimedController
+from annelid.config import RunConfig, load_config
+from annelid.control import SineController, TimedController
 from annelid.control.open_loop import SineWave, TimedWave
-from annelid.control.sns import AdaptiveSns as AdaptiveSection
 from annelid.errors import ConfigError
 from annelid.protocols import Controller, Records, Sensation, Stateful
 from annelid.simulation import Run, simulate
 from annelid_studies.oscillators import HeteroclinicController, PhaseChainController
 from annelid_studies.oscillators.controllers import HeteroclinicChannel, PhaseChain
 
-KINDS = ("sine", "timed", "shc", "phase-chain", "adaptive")
+KINDS = ("sine", "timed", "shc", "phase-chain")
 
 
 def at(time_s: float, n: int = 3, longer_m: Any = 0.0, load_N: Any = 0.0) -> Sensation:
@@ -42,10 +41,8 @@ def built(kind: str, n_segments: int = 3, n_muscles: int | None = None) -> Contr
             return TimedController(TimedWave(), *size)
         case "shc":
             return HeteroclinicController(HeteroclinicChannel(noise=1e-3), *size, 0.001)
-        case "phase-chain":
-            return PhaseChainController(PhaseChain(drive=2.0, drive_slope_per_s=0.5, limbs=True), *size, 0.001)
         case _:
-            return AdaptiveController(AdaptiveSection(drive=0.4), StretchSensor(), *size, 0.001)
+            return PhaseChainController(PhaseChain(drive=2.0, drive_slope_per_s=0.5, limbs=True), *size, 0.001)
 
 
 def drive(controller: Controller, first: int, steps: int, n: int = 3) -> np.ndarray:
@@ -194,17 +191,6 @@ def test_the_drive_s_slope_takes_a_walking_worm_to_swimming() -> None:
     # At 8 s the drive is 2.8 (limbs lead), at 15 s 3.5.
     assert rate_Hz[1590:1610].mean() == pytest.approx(0.56, abs=0.05)
     assert rate_Hz[2990:3010].mean() == pytest.approx(1.0, abs=0.05)
-
-
-def test_sensory_drive_quickens_what_is_stretched() -> None:
-    one = AdaptiveController(
-        AdaptiveSection(drive=0.1, stretch_gain_per_m=10.0, drive_time_constant_s=0.02), StretchSensor(), 3, 3, 0.001
-    )
-    for longer, expected in (([0.0, 0.0, 0.0], 0.1), ([0.03, 0.06, 0.0], 0.4), ([0.3, 0.3, 0.3], 1.0)):
-        one.reset(0)
-        for k in range(300):
-            one.step(at(k * 1e-3, longer_m=longer))
-        assert one.read(frame=False)["drive"] == pytest.approx(expected, abs=1e-6)
 
 
 def test_a_bad_section_is_refused_in_one_sentence(subtests: pytest.Subtests) -> None:

@@ -24,7 +24,7 @@ from annelid.draw.figures.network_diagram import (
 )
 from annelid.errors import ConfigError
 from annelid.nervous import Network
-from annelid.nervous.neurons import GapJunction, ModulatorySynapse, Neuron, Synapse, persistent_sodium
+from annelid.nervous.neurons import GapJunction, Neuron, Synapse, persistent_sodium
 from annelid.nervous.peristalsis import peristalsis_network
 from annelid.nervous.robust import robust_network
 from annelid.nervous.tables import effect_of
@@ -144,7 +144,7 @@ def own_network() -> Network:
     network.add_synapse("sensor", "command", Synapse(0.3, 194.0))
     network.add_synapse("sensor", "command", Synapse(0.2, -40.0))
     network.add_synapse("sensor", "sensor", Synapse(0.2, 100.0))
-    network.add_synapse("command", "right", ModulatorySynapse("leak", 2.0))
+    network.add_synapse("command", "right", Synapse(0.4, 60.0))
     network.add_gap_junction("command", "left", GapJunction(0.5))
     network.add_gap_junction("command", "motor", GapJunction(0.5, rectified=True))
     network.add_input("touch", ("sensor", "command"))

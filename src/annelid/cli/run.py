@@ -6,9 +6,9 @@ import os
 import re
 import sys
 from collections.abc import Callable
-from contextlib import ExitStack, suppress
+from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
@@ -25,15 +25,9 @@ from annelid.cli.common import (
     print_results,
     print_run,
 )
-from annelid.cli.entry import EXIT_INTERRUPTED, command, complain, end_study, lock, typed_command
+from annelid.cli.entry import EXIT_INTERRUPTED, command, complain, end_study, lock
 from annelid.cli.result import wants_json
 from annelid.errors import ConfigError, SimulationStopped
-
-if TYPE_CHECKING:
-    from annelid.config import RunConfig
-    from annelid.experiment.check import Check
-    from annelid.experiment.progress import StudyProgress
-    from annelid.simulation.runfile import Run
 
 
 @command("run", "Make")
@@ -146,23 +140,24 @@ def run_command(
         complain(f"warning: {doubt}")
     folder = locked_folder(out, config.name)
     result, checked = None, None
-    progress = False if quiet else _lines(config.duration_s)
     try:
-        if check:
-            done, checked = _checked(config, folder, jobs=jobs, force=force, quiet=quiet, progress=progress, out=out)
-        elif uncertainty is None:
-            done = simulate(config, folder, resume=resume, progress=progress, overwrite=force)
-        else:
-            from annelid.experiment import uncertainty as study
+        if check or uncertainty is not None:
+            from annelid.experiment import uncertainty as error_bars
+            from annelid.experiment.check import check as check_run
             from annelid.experiment.progress import study_progress
 
-            spread = study.read_spread(uncertainty_from).but(_errors(vary))
+            spread = error_bars.read_spread(uncertainty_from).but(_errors(vary))
             further = ["--out", str(folder)] if out is None else []
             with going_on(folder, *further), study_progress(quiet=quiet) as shown:
-                result = study.uncertainty(
-                    config, uncertainty, folder, spread=spread, jobs=jobs, overwrite=force, progress=shown
-                )
+                how: dict[str, Any] = {"jobs": jobs, "overwrite": force, "progress": shown}
+                if uncertainty is None:
+                    _, checked = check_run(config, folder, **how)
+                else:
+                    result = error_bars.uncertainty(config, uncertainty, folder, spread=spread, **how)
             done = open_run(folder)
+        else:
+            progress = False if quiet else _lines(config.duration_s)
+            done = simulate(config, folder, resume=resume, progress=progress, overwrite=force)
     except SimulationStopped as stop:
         if not (folder / FILE_NAME).exists():
             raise
@@ -181,8 +176,8 @@ def run_command(
         print_results(write_uncertainty(result), uncertainty_table(result), quiet=quiet)
     print_paths(draw_all(done, folder, video=video, quiet=quiet, complain=complain))
     if result is not None:
-        stopped = sum(bool(run.message) for run in result.runs)
-        end_study(len(result.runs), 0, folder / "uncertainty.json", stopped=stopped)
+        failed, stopped = (sum(one.status == status for *_, one in result.runs) for status in ("failed", "stopped"))
+        end_study(len(result.runs), failed, folder / "uncertainty.json", stopped=stopped)
 
 
 def _lines(end_s: float) -> Callable[[float, float], object] | None:
@@ -193,44 +188,6 @@ def _lines(end_s: float) -> Callable[[float, float], object] | None:
         return None
     lines = Lines(sys.stderr, at_once=False)
     return lambda simulated_s, _: lines(f"simulating {end_s:g} s", 0, 0, simulated_s / end_s)
-
-
-def _checked(
-    config: RunConfig,
-    folder: Path,
-    *,
-    jobs: int | None,
-    force: bool,
-    quiet: bool,
-    progress: bool | Callable[[float, float], object] | None,
-    out: Path | None,
-) -> tuple[Run, Check]:
-    """Runs a worm with its finer runs; on Ctrl-C prints the numbers of the run itself, and says how to go on."""
-    from annelid.experiment.check import check
-    from annelid.experiment.progress import study_progress
-    from annelid.simulation.runfile import FILE_NAME, open_run
-
-    shown: list[StudyProgress | None] = []
-    with ExitStack() as stack:
-
-        def report(*state: Any) -> None:
-            # The bar of the run itself comes first, and two at a time do not go together.
-            if not shown:
-                shown.append(stack.enter_context(study_progress(quiet=quiet)))
-            if shown[0] is not None:
-                shown[0](*state)
-
-        try:
-            return check(config, folder, jobs=jobs, overwrite=force, run_progress=progress, progress=report)
-        except KeyboardInterrupt:
-            stack.close()
-            if not (folder / FILE_NAME).exists():
-                raise
-            left = open_run(folder)
-            print_run(left, quiet=quiet)
-            further = ["--out", str(folder)] if out is None else []
-            complain(f"interrupted: the run is kept in {left.path}; check it with: {typed_command(*further)}")
-            raise typer.Exit(EXIT_INTERRUPTED) from None
 
 
 def _errors(vary: list[str] | None) -> dict[str, float]:

@@ -9,6 +9,7 @@ overridden by its dotted path (``body.mesh.n_segments=4``). A level of `fidelity
 from __future__ import annotations
 
 from annelid.config.checking import (
+    CONSTANT,
     REPLACED,
     check_config,
     check_section,
@@ -39,6 +40,7 @@ from annelid.config.study import Study, Vary, load_study
 from annelid.textfiles import toml_value
 
 __all__ = [
+    "CONSTANT",
     "LEVELS",
     "REPLACED",
     "ArenaKind",

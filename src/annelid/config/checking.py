@@ -115,8 +115,52 @@ REPLACED = {
     "body.formulation.solver_iterations": "the solver's limits are constants of the formulation",
     "body.formulation.solver_tolerance": "the solver's limits are constants of the formulation",
     "controller.landing": "it saved nothing (sns-pressure)",
+    "controller.let_go_s": "it is controller.motor_time_constant_s",
+    "controller.drive_slope_per_s": "the drive of 'adaptive' is constant during a run",
+    "controller.stretch_gain_per_m": "the drive of 'adaptive' is constant during a run",
+    "controller.drive_time_constant_s": "the descending neuron of 'adaptive' has 0.05 s",
+    "controller.light_N": "'sns-pressure' has the loads of the six-segment robot",
+    "controller.full_N": "'sns-pressure' has the loads of the six-segment robot",
+    "controller.extending_m": "'sns-pressure' has the lengths of the six-segment robot",
+    "controller.extended_m": "'sns-pressure' has the lengths of the six-segment robot",
+    "controller.pressure_time_constant_s": "the pressure neurons of 'sns-pressure' have 0.03 s",
+    "turning.arm_N": "'touch' is the published rule",
+    "turning.hold_s": "'touch' is the published rule",
+    "turning.least_N": "'touch' is the published rule",
+    "turning.full_N": "'touch' is the published rule",
+    "turning.rate_per_s": "'touch' is the published rule",
 }
 """What replaced fields that older files have, by their dotted paths."""
+CONSTANT = {
+    "controller.capacitance_nF": 5.0,
+    "controller.leak_conductance_uS": 1.0,
+    "controller.range_mV": 20.0,
+    "controller.bifurcation_mV": -1.0,
+    "controller.offset_mV": 0.1,
+    "controller.inhibitory_reversal_mV": -40.0,
+    "controller.excitatory_reversal_mV": 194.0,
+    "controller.sodium_reversal_mV": 110.0,
+    "controller.gate_slope_per_mV": 0.05,
+    "controller.gate_time_constant_ms": 300.0,
+    "controller.push_nA": 6.0,
+    "controller.entrainment": 0.02,
+    "controller.habit_ms": 10000.0,
+    "controller.full_stretch_m": 0.08,
+    "controller.scheme": "euler",
+    "controller.drive_time_constant_s": 0.05,
+    "controller.light_N": 2.5,
+    "controller.full_N": 9.0,
+    "controller.extending_m": 0.045,
+    "controller.extended_m": 0.055,
+    "controller.pressure_time_constant_s": 0.03,
+    "turning.arm_N": 2.0,
+    "turning.hold_s": 6.0,
+    "turning.least_N": 1.0,
+    "turning.full_N": 15.0,
+    "turning.rate_per_s": 10.0,
+}
+"""Values of fields that are constants now: an older file with such a value says nothing else."""
+REPLACED |= {path: "a constant of annelid.nervous.robust for 'sns-robust'" for path in CONSTANT if path not in REPLACED}
 
 
 def has_field(path: str, tree: Mapping[str, Any]) -> bool:

@@ -1,40 +1,48 @@
 """Everything that turns sensation into activation."""
 
-from annelid.control.base import (
-    SENSED,
-    CallableController,
-    Coded,
-    ControllerCode,
-    OpenLoopController,
-    SegmentController,
-    Slope,
-)
-from annelid.control.network import NetworkController, Sense
+from annelid.control.base import CallableController, OpenLoopController, SegmentController, Slope
+from annelid.control.circuit import SENSED, Circuit, Pulse, Readout, Sense, Source, Switch, lengthening_m
+from annelid.control.circuit_controller import CircuitController, CircuitKind
+from annelid.control.network import NetworkController
 from annelid.control.open_loop import ProgramController, SineController, TimedController
 from annelid.control.own import own_controller
-from annelid.control.sns import DRIVE_HINT, AdaptiveController, SnsController, paper_controller
-from annelid.control.stretch_sensor import StretchSensor, lengthening_m
-from annelid.lazy import moved
+from annelid.control.sns import DRIVE_HINT, paper_controller
+from annelid.control.turning import TurningController
+from annelid.lazy import lazy
 
 __all__ = [
     "DRIVE_HINT",
     "SENSED",
-    "AdaptiveController",
     "CallableController",
-    "Coded",
-    "ControllerCode",
+    "Circuit",
+    "CircuitController",
+    "CircuitKind",
     "NetworkController",
     "OpenLoopController",
     "ProgramController",
+    "Pulse",
+    "Readout",
     "SegmentController",
     "Sense",
     "SineController",
     "Slope",
-    "SnsController",
-    "StretchSensor",
+    "Source",
+    "Switch",
     "TimedController",
+    "TurningController",
     "lengthening_m",
     "own_controller",
     "paper_controller",
 ]
-__getattr__ = moved(__name__, "annelid_studies.oscillators")
+_BUILT = "load_config and build_controller make the CircuitController of a configuration"
+__getattr__, __dir__ = lazy(
+    __name__,
+    {
+        "SnsController": _BUILT,
+        "AdaptiveController": _BUILT,
+        "StretchSensor": "a Switch of a Circuit is a sensor with threshold and hysteresis",
+        "Coded": "a Circuit is written as C by annelid_lab.firmware",
+        "ControllerCode": "a Circuit is written as C by annelid_lab.firmware",
+    },
+    ("annelid_studies.oscillators",),
+)

@@ -53,7 +53,7 @@ class SineController(OpenLoopController[SineWave]):
             ``level (1 + cos(2 pi (t / period - waves i / N))) / 2`` of segment i = 0 .. N-1, in [0, level], shape
             ``(*time_s.shape, n_segments)``.
         """
-        wave, n = self._pattern, self._n_segments
+        wave, n = self.pattern, self.n_segments
         turns = np.asarray(time_s, dtype=float)[..., np.newaxis] / wave.period_s
         lag = wave.waves * np.arange(n) / n
         return 0.5 * wave.level * (1.0 + np.cos(2.0 * np.pi * (turns - lag)))
@@ -131,8 +131,8 @@ class TimedController(OpenLoopController[TimedWave]):
         Returns:
             Activation of each segment in [0, level], ``(*time_s.shape, n_segments)``.
         """
-        wave, cycle = self._pattern, self.cycle_s
-        start = np.array([segment * wave.interval_s % cycle for segment in range(self._n_segments)])
+        wave, cycle = self.pattern, self.cycle_s
+        start = np.array([segment * wave.interval_s % cycle for segment in range(self.n_segments)])
         start[cycle - start < SLACK_S] = 0.0
         since_first = np.asarray(time_s, dtype=float)[..., np.newaxis] - start + SLACK_S
         since = np.where(since_first >= 0, since_first % cycle, np.inf) - SLACK_S
@@ -202,9 +202,9 @@ class ProgramController(OpenLoopController[Program]):
         Returns:
             Activation of each segment in [0, 1], shape ``(*time_s.shape, n_segments)``.
         """
-        times, ramp = np.asarray(time_s, dtype=float), self._pattern.ramp_s
-        activation = np.zeros((*times.shape, self._n_segments))
-        for contraction in self._pattern.contractions:
+        times, ramp = np.asarray(time_s, dtype=float), self.pattern.ramp_s
+        activation = np.zeros((*times.shape, self.n_segments))
+        for contraction in self.pattern.contractions:
             of_segment = activation[..., contraction.segment - 1]
             since_start, since_stop = times - contraction.start_s, times - contraction.stop_s
             if ramp > 0:

@@ -140,17 +140,17 @@ def _slot(time_s: float, length_s: float) -> int:
 class TrialController(WrappedController):
     """A controller between whom and the body something goes wrong."""
 
-    _between: Faults
+    between: Faults
 
     def reset(self, seed: int) -> None:
         """Returns to the initial state; a blind controller is reset with seed 0."""
-        self._inner.reset(0 if self._between.trial.blind else seed)
-        self._between.reset(seed)
+        self.inner.reset(0 if self.between.trial.blind else seed)
+        self.between.reset(seed)
 
     def step(self, sensation: Sensation) -> Array:
         """Advances by one control step, as `annelid.protocols.Controller.step`."""
-        command = np.asarray(self._inner.step(self._between.sensed(sensation)), dtype=float)
-        return self._between.moved(command, sensation.time_s)
+        command = np.asarray(self.inner.step(self.between.sensed(sensation)), dtype=float)
+        return self.between.moved(command, sensation.time_s)
 
 
 class SavedTrialController(SavedWrapper, TrialController):

@@ -17,7 +17,8 @@ from pydantic import Field
 from annelid.clock import SLACK_S
 from annelid.config.run import Goals, RunConfig, TurningKind
 from annelid.config.sections import Level, NonNegative, Positive
-from annelid.control.base import Coded, ControllerCode, SavedWrapper, TimeConstant, heading_angle
+from annelid.control.base import SavedWrapper, TimeConstant
+from annelid.control.circuit import heading_angle
 from annelid.errors import ConfigError
 from annelid.protocols import (
     SIDES,
@@ -26,6 +27,7 @@ from annelid.protocols import (
     Sensation,
     Stateful,
     Steering,
+    SteeringCode,
     StridingController,
     Values,
 )
@@ -35,6 +37,10 @@ Waypoint = tuple[Annotated[float, Field(ge=-1e4, le=1e4)], Annotated[float, Fiel
 Now = dict[str, NDArray[Any]]
 """All that the next step of a turning depends on."""
 HALVES = ("left", "right")
+TOUCH_STARTS_N, TOUCH_LEAST_N, TOUCH_FULL_N = 2.0, 1.0, 15.0
+"""Of turning by touch: the differences that start the timer, that act while it runs, and that silence a side."""
+TOUCH_HOLD_S, SCALE_RATE_PER_S = 6.0, 10.0
+"""Time of the timer, and the fastest change of a scale."""
 LEFT, RIGHT = SIDES.index("left"), SIDES.index("right")
 
 
@@ -79,8 +85,8 @@ class SteeringKind(TurningKind):
         """What is left of the activation of each half, in [0, 1], ``(n_segments, 2)``."""
 
     @abstractmethod
-    def _code(self, timestep_s: float, n_segments: int) -> dict[str, Any]:
-        """Both of these as C: fields of `ControllerCode`, and statements that multiply the activation."""
+    def _code(self, timestep_s: float, n_segments: int) -> SteeringCode:
+        """Both of these as C."""
 
 
 class Descending(SteeringKind):
@@ -120,14 +126,14 @@ class Descending(SteeringKind):
         return half_scales(float(now["modulation"]) * np.array(self.shares or [1.0] * n_segments))
 
     @abstractmethod
-    def _wanted_code(self, timestep_s: float) -> dict[str, Any]:
+    def _wanted_code(self, timestep_s: float) -> SteeringCode:
         """What sets ``wanted`` as C, as `_code`."""
 
-    def _code(self, timestep_s: float, n_segments: int) -> dict[str, Any]:
-        found = self._wanted_code(timestep_s)
+    def _code(self, timestep_s: float, n_segments: int) -> SteeringCode:
+        wanted = self._wanted_code(timestep_s)
         statements = f"""
     {{
-        real wanted = 0;{found.get("statements", "")}
+        real wanted = 0;{wanted.statements}
         now.modulation = wanted + (now.modulation - wanted) * keeps;
         for (i = 0; i < N_SEGMENTS; i++) {{
             const real m = now.modulation * share_of_modulation[i];
@@ -139,13 +145,12 @@ class Descending(SteeringKind):
             "keeps": math.exp(-timestep_s / self.descending_time_constant_s),
             "share_of_modulation": np.array(self.shares or [1.0] * n_segments, dtype=float),
         }
-        state = {"modulation": 0.0, **found.get("state", {})}
-        return {
-            **found,
-            "statements": statements,
-            "constants": {**constants, **found["constants"]},
-            "state": state,
-        }
+        return replace(
+            wanted,
+            statements=statements,
+            constants={**constants, **wanted.constants},
+            state={"modulation": 0.0, **wanted.state},
+        )
 
 
 class ConstantTurning(Descending):
@@ -157,11 +162,8 @@ class ConstantTurning(Descending):
     def _wanted(self, now: Now, sensation: Sensation, timestep_s: float) -> float:
         return self.modulation
 
-    def _wanted_code(self, timestep_s: float) -> dict[str, Any]:
-        return {
-            "statements": "\n        wanted = wanted_modulation;",
-            "constants": {"wanted_modulation": self.modulation},
-        }
+    def _wanted_code(self, timestep_s: float) -> SteeringCode:
+        return SteeringCode("\n        wanted = wanted_modulation;", constants={"wanted_modulation": self.modulation})
 
 
 class Steered(Descending):
@@ -203,11 +205,11 @@ class Steered(Descending):
         return min(max(modulation, -self.largest_modulation), self.largest_modulation)
 
     @abstractmethod
-    def _target_code(self) -> dict[str, Any]:
+    def _target_code(self) -> SteeringCode:
         """What sets ``target``, and ``wanted`` to 1 if there is one, as C, as `_code`."""
 
-    def _wanted_code(self, timestep_s: float) -> dict[str, Any]:
-        found = self._target_code()
+    def _wanted_code(self, timestep_s: float) -> SteeringCode:
+        target = self._target_code()
         statements = f"""
         real target = 0, rate;
         const real heading = sensors->heading_rad[0];
@@ -215,7 +217,7 @@ class Steered(Descending):
             for (i = 0; i < 3; i++) now.headings[i] = heading;
         now.headings[1] += wrapped(heading - now.headings[1]);
         rate = (now.headings[1] - now.headings[2]) / rate_time_constant_s;
-        now.headings[2] += rate_share * (now.headings[1] - now.headings[2]);{found["statements"]}
+        now.headings[2] += rate_share * (now.headings[1] - now.headings[2]);{target.statements}
         if (wanted > 0)
             wanted = clipped(
                 gain_per_rad * wrapped(target - now.headings[1]) - rate_gain_s * rate,
@@ -228,13 +230,13 @@ class Steered(Descending):
             "rate_share": -math.expm1(-timestep_s / self.rate_time_constant_s),
             "largest_modulation": self.largest_modulation,
         }
-        return {
-            "senses": ("heading_rad", *found.get("senses", ())),
-            "statements": statements,
-            "constants": {**constants, **found["constants"]},
-            "state": {"headings": np.zeros(3), **found.get("state", {})},
-            "helpers": _WRAPPED,
-        }
+        return SteeringCode(
+            statements,
+            ("heading_rad", *target.senses),
+            {**constants, **target.constants},
+            {"headings": np.zeros(3), **target.state},
+            _WRAPPED,
+        )
 
 
 class HeadingTurning(Steered):
@@ -248,9 +250,9 @@ class HeadingTurning(Steered):
     def _target(self, now: Now, sensation: Sensation) -> float:
         return float(now["headings"][0]) + math.radians(self.heading_deg)
 
-    def _target_code(self) -> dict[str, Any]:
+    def _target_code(self) -> SteeringCode:
         statements = "\n        target = now.headings[0] + heading_rad;\n        wanted = 1;"
-        return {"statements": statements, "constants": {"heading_rad": math.radians(self.heading_deg)}}
+        return SteeringCode(statements, constants={"heading_rad": math.radians(self.heading_deg)})
 
 
 class CourseTurning(Steered):
@@ -280,7 +282,7 @@ class CourseTurning(Steered):
             now["n_reached"] += 1
         return None
 
-    def _target_code(self) -> dict[str, Any]:
+    def _target_code(self) -> SteeringCode:
         statements = f"""
         for (; now.n_reached < {len(self.waypoints)}; now.n_reached++) {{
             const real *waypoint = waypoints_m[(int)now.n_reached];
@@ -292,25 +294,20 @@ class CourseTurning(Steered):
             }}
         }}"""
         constants = {"waypoints_m": np.array(self.waypoints, dtype=float), "reach_m": self.reach_m}
-        return {"senses": ("front_m",), "statements": statements, "constants": constants, "state": {"n_reached": 0.0}}
+        return SteeringCode(statements, ("front_m",), constants, {"n_reached": 0.0})
 
 
 class TouchTurning(SteeringKind):
     """Turning away from contact, as the authors published it.
 
-    f is the force on the right of the foremost segment minus that on its left. ``|f| > arm_N`` starts a timer of
-    ``hold_s``. While it runs and ``|f| >= least_N``, the side away from contact is scaled by
-    ``max((full_N - |f|) / full_N, 0)``, of which the smallest so far applies. When it has run out both sides are whole
-    again, and only then can it start anew. A scale changes by at most ``rate_per_s``.
+    f is the force on the right of the foremost segment minus that on its left. ``|f| > 2 N`` starts a timer of 6 s.
+    While it runs and ``|f| >= 1 N``, the side away from contact is scaled by ``max(1 - |f| / 15 N, 0)``, of which the
+    smallest so far applies. When it has run out both sides are whole again, and only then can it start anew. A scale
+    changes by at most 10 in a second.
     """
 
     cites = (("riddle2025models", "turning away from contact"),)
     kind: Literal["touch"] = "touch"
-    arm_N: NonNegative = Field(default=2.0, description="difference of the front's touch that starts the timer")
-    hold_s: Positive = Field(default=6.0, description="time of the timer")
-    least_N: NonNegative = Field(default=1.0, description="difference below which a running timer scales nothing")
-    full_N: Positive = Field(default=15.0, description="difference at which a side is silenced")
-    rate_per_s: Positive = Field(default=10.0, description="fastest change of a scale")
 
     def _at_start(self) -> Now:
         return {"timer": np.array(0.0), "latched": np.ones(2), "scales": np.ones(2)}
@@ -322,30 +319,30 @@ class TouchTurning(SteeringKind):
         size, latched = abs(difference_N), now["latched"]
         if now["timer"] <= SLACK_S:
             latched[:] = 1.0
-            now["timer"][...] = self.hold_s if size > self.arm_N else 0.0
+            now["timer"][...] = TOUCH_HOLD_S if size > TOUCH_STARTS_N else 0.0
         if now["timer"] > SLACK_S:
-            if size >= self.least_N:
+            if size >= TOUCH_LEAST_N:
                 away = 0 if difference_N > 0 else 1
-                latched[away] = min(latched[away], max((self.full_N - size) / self.full_N, 0.0))
+                latched[away] = min(latched[away], max((TOUCH_FULL_N - size) / TOUCH_FULL_N, 0.0))
             now["timer"] -= timestep_s
-        reach = self.rate_per_s * timestep_s
+        reach = SCALE_RATE_PER_S * timestep_s
         now["scales"] += np.clip(latched - now["scales"], -reach, reach)
 
     def _scales(self, now: Now, n_segments: int) -> Array:
         return np.tile(now["scales"], (n_segments, 1))
 
-    def _code(self, timestep_s: float, n_segments: int) -> dict[str, Any]:
+    def _code(self, timestep_s: float, n_segments: int) -> SteeringCode:
         statements = f"""
     {{
         const real difference_N = sensors->touch_N[0][{RIGHT}] - sensors->touch_N[0][{LEFT}];
         const real size_N = difference_N < 0 ? -difference_N : difference_N;
         if (now.timer_s <= slack_s) {{
             now.latched[0] = now.latched[1] = 1;
-            now.timer_s = size_N > arm_N ? turning_s : 0;
+            now.timer_s = size_N > touch_starts_N ? turning_s : 0;
         }}
         if (now.timer_s > slack_s) {{
             real *away = &now.latched[difference_N > 0 ? 0 : 1];
-            if (size_N >= least_N) *away = clipped((touch_full_N - size_N) / touch_full_N, 0, *away);
+            if (size_N >= touch_least_N) *away = clipped((touch_full_N - size_N) / touch_full_N, 0, *away);
             now.timer_s -= step_s;
         }}
         for (j = 0; j < 2; j++) {{
@@ -355,15 +352,15 @@ class TouchTurning(SteeringKind):
     }}"""
         constants = {
             "slack_s": SLACK_S,
-            "arm_N": self.arm_N,
-            "turning_s": self.hold_s,
-            "least_N": self.least_N,
-            "touch_full_N": self.full_N,
+            "touch_starts_N": TOUCH_STARTS_N,
+            "turning_s": TOUCH_HOLD_S,
+            "touch_least_N": TOUCH_LEAST_N,
+            "touch_full_N": TOUCH_FULL_N,
             "step_s": timestep_s,
-            "scale_reach": self.rate_per_s * timestep_s,
+            "scale_reach": SCALE_RATE_PER_S * timestep_s,
         }
         state = {"timer_s": 0.0, "latched": np.ones(2), "half_scale": np.ones(2)}
-        return {"senses": ("touch_N",), "statements": statements, "constants": constants, "state": state}
+        return SteeringCode(statements, ("touch_N",), constants, state)
 
 
 class RuleSteering(Steering):
@@ -386,7 +383,7 @@ class RuleSteering(Steering):
             self._rule._advance(self._now, sensation, self._timestep_s)
         return self.scales()
 
-    def code(self) -> dict[str, Any]:
+    def code(self) -> SteeringCode:
         """Returns a step as C, as `Steering.code`."""
         return self._rule._code(self._timestep_s, self._n_segments)
 
@@ -407,14 +404,15 @@ class RuleSteering(Steering):
 class TurningController(SavedWrapper):
     """A controller whose pattern another one makes, and whose sides a steering scales.
 
-    The pattern senses that it is scaled only through the body: its rhythm is its own.
+    The pattern senses that it is scaled only through the body: its rhythm is its own. Its rules count time, follow a
+    course and act on the activation, so they are no rows of senses of a `Circuit`: each is written in C, too.
 
     Raises:
         ConfigError: Whole rings, or a pattern whose state cannot be saved.
     """
 
     prefixes = ("pattern_", "turning_")
-    _between: Steering
+    between: Steering
 
     def __init__(
         self, pattern: Controller, section: TurningKind, n_segments: int, n_muscles: int, control_timestep_s: float
@@ -427,24 +425,16 @@ class TurningController(SavedWrapper):
         super().__init__(pattern, section.build(n_segments, control_timestep_s))
         self._timestep_s = control_timestep_s
 
-    def code(self) -> ControllerCode:
-        """Returns what it does as C, as `annelid.control.base.Coded.code`."""
-        if not isinstance(self._inner, Coded):
-            raise ConfigError(f"turning of {self.name} cannot be written as C: its pattern steps no network")
-        pattern, own = self._inner.code(), self._between.code()
-        return replace(
-            pattern,
-            senses=tuple(dict.fromkeys((*pattern.senses, *own.get("senses", ())))),
-            activation=pattern.activation + own["statements"],
-            constants={**pattern.constants, **own["constants"]},
-            state={**pattern.state, **own["state"]},
-            helpers=pattern.helpers + own.get("helpers", ""),
-        )
+    @property
+    def senses(self) -> tuple[str, ...]:
+        """What it senses, names in `annelid.control.SENSED`."""
+        pattern = getattr(self.inner, "senses", ("lengthening_m",))
+        return tuple(dict.fromkeys((*pattern, *self.between.code().senses)))
 
     def reset(self, seed: int) -> None:
         """Returns to the initial state; ``seed`` is the pattern's."""
-        self._inner.reset(seed)
-        self._between.reset()
+        self.inner.reset(seed)
+        self.between.reset()
 
     def step(self, sensation: Sensation) -> Array:
         """Advances by one control step, as `stride`."""
@@ -454,9 +444,9 @@ class TurningController(SavedWrapper):
         """Advances by control steps, as `annelid.protocols.StridingController.stride`."""
         first = round(sensation.time_s / self._timestep_s)
         felt = [sensation, *(sensation.later((first + k) * self._timestep_s) for k in range(1, n_steps))]
-        scales = np.stack([self._between.advance(one, 1) for one in felt])
-        if isinstance(self._inner, StridingController):
-            activation = self._inner.stride(sensation, n_steps)
+        scales = np.stack([self.between.advance(one, 1) for one in felt])
+        if isinstance(self.inner, StridingController):
+            activation = self.inner.stride(sensation, n_steps)
         else:
-            activation = np.stack([self._inner.step(one) for one in felt])
+            activation = np.stack([self.inner.step(one) for one in felt])
         return (activation.reshape(scales.shape) * scales).reshape(n_steps, -1)

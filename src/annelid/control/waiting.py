@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import Literal
 
-from annelid.config.run import ControllerKind, RunConfig
-from annelid.control.sns import PeristalsisController, Sns
-from annelid.nervous import Network, peristalsis
-from annelid.protocols import Plant
+from annelid.config.run import RunConfig
+from annelid.control.circuit import Circuit
+from annelid.control.circuit_controller import CircuitKind
+from annelid.control.sns import Sns
+from annelid.nervous import peristalsis
 
 
-class WaitingSns(ControllerKind):
+class WaitingSns(CircuitKind):
     """The synthetic nervous system with a gate that waits: `annelid.nervous.peristalsis.waiting_network`.
 
     A segment contracts when the one before it is at rest again after its contraction. In the paper's network it does so
@@ -27,23 +28,11 @@ class WaitingSns(ControllerKind):
     kind: Literal["sns-waiting"] = "sns-waiting"
     network: Sns = Sns()
 
-    def build(self, config: RunConfig, plant: Plant) -> WaitingController:
-        """Builds the controller, as `ControllerKind.build`."""
-        size = plant.n_segments, plant.n_muscles
-        return WaitingController(self, config.sensor, *size, config.clock.control_timestep_s)
+    def circuit(self, config: RunConfig, n_segments: int) -> Circuit:
+        """Returns the circuit, as `CircuitKind.circuit`."""
+        network = peristalsis.waiting_network(n_segments, self.network.design)
+        return self.network.gated(network, config, n_segments, "synthetic nervous system that waits for rest")
 
     def cited(self) -> tuple[tuple[str, str], ...]:
         """Returns what the network rests on."""
         return self.network.cited()
-
-
-class WaitingController(PeristalsisController[WaitingSns]):
-    """Drives a worm by `annelid.nervous.peristalsis.waiting_network`.
-
-    The rest, errors too, is as for `annelid.control.SnsController`.
-    """
-
-    name = "synthetic nervous system that waits for rest"
-
-    def _network(self, n_segments: int) -> Network:
-        return peristalsis.waiting_network(n_segments, self._parameters)

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from annelid.draw.canvas import plain, save
     from annelid.draw.figures import RUN_FIGURES
     from annelid.draw.figures.comparison import lengths_figure, potentials_figure, travel_figure
-    from annelid.draw.figures.experiments import Panel, load_frame_figure, progress_figure, uncertainty_figure
+    from annelid.draw.figures.experiments import load_frame_figure, progress_figure, uncertainty_figure
     from annelid.draw.figures.network_diagram import network_figure
     from annelid.draw.gl import find_backend
     from annelid.draw.overlay import legend_handle
@@ -48,7 +48,6 @@ __all__ = [
     "UNKNOWN",
     "VIEWS_DEG",
     "WIDTH_IN",
-    "Panel",
     "Skeleton",
     "WormScene",
     "activation_color",
@@ -85,5 +84,10 @@ __all__ = [
 ]
 
 __getattr__, __dir__ = lazy(
-    __name__, {"Mark": "progress_figure takes the values of the trials"}, ("annelid_studies.planar",)
+    __name__,
+    {
+        "Mark": "progress_figure takes the values of the trials",
+        "Panel": "uncertainty_figure takes the rows of uncertainty.csv",
+    },
+    ("annelid_studies.planar",),
 )

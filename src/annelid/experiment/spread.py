@@ -6,20 +6,18 @@ the one that comes with annelid is of the load frame alone. They are relative, a
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import reduce
 from importlib import resources
 from math import exp, inf, sqrt
 from pathlib import Path
-from statistics import NormalDist
 from typing import Any
 
 import numpy as np
 from pydantic import BaseModel
 
 from annelid.body.actuators.servo import wrap_factors
-from annelid.config import RunConfig
+from annelid.config import RunConfig, field_value, fields_of
 from annelid.errors import ConfigError, UnreadableText, suggest
 from annelid.experiment.space import unit_samples
 from annelid.morphology import Array
@@ -83,12 +81,6 @@ class Spread:
         correlation[: len(self.names), : len(self.names)] = self.correlation
         source = f"{self.source}; {', '.join(f'{name} as given' for name in errors)}" if errors else self.source
         return Spread(tuple(known), np.array(list(known.values())), correlation, source, self.cable_exponent)
-
-    def only(self, names: Sequence[str]) -> Spread:
-        """Returns the spread of some of its parameters."""
-        chosen = [self.names.index(name) for name in names]
-        correlation = self.correlation[np.ix_(chosen, chosen)]
-        return replace(self, names=tuple(names), relative_error=self.relative_error[chosen], correlation=correlation)
 
 
 class _Parameter(BaseModel):
@@ -163,7 +155,14 @@ def applicable(config: RunConfig, spread: Spread) -> tuple[Spread, dict[str, str
             left_out[name] = ABSENT
         elif not errors.get(name):
             left_out[name] = EXACT if name in errors else UNMEASURED
-    return spread.only([name for name in spread.names if name not in left_out]), left_out
+    kept = [i for i, name in enumerate(spread.names) if name not in left_out]
+    chosen = replace(
+        spread,
+        names=tuple(spread.names[i] for i in kept),
+        relative_error=spread.relative_error[kept],
+        correlation=spread.correlation[np.ix_(kept, kept)],
+    )
+    return chosen, left_out
 
 
 def draw(n: int, spread: Spread, seed: int) -> Array:
@@ -177,12 +176,13 @@ def draw(n: int, spread: Spread, seed: int) -> Array:
     Returns:
         The changes of p parameters in each of n >= 2 samples, ``(n, p)``.
     """
+    from scipy.special import ndtri
+
     p = len(spread.names)
     if not p:
         return np.empty((n, 0))
     # Clear of 0 and 1, where the normal numbers are infinite.
-    shares = unit_samples("lhs", n, p, seed).clip(1e-9, 1.0 - 1e-9)
-    normal = np.vectorize(NormalDist().inv_cdf, otypes=[float])(shares)
+    normal = ndtri(unit_samples("lhs", n, p, seed).clip(1e-9, 1.0 - 1e-9))
     left, _, right = np.linalg.svd(normal - normal.mean(axis=0), full_matrices=False)
     rank = min(n - 1, p)
     independent = sqrt((n - 1) * p / rank) * left[:, :rank] @ right[:rank]
@@ -206,7 +206,6 @@ def changes(config: RunConfig, spread: Spread, relative: Array) -> dict[str, Any
 
 def scaled_fields(config: RunConfig, name: str) -> dict[str, Any]:
     """Returns the fields that a parameter scales in this worm by dotted path, with their values."""
-    values: dict[str, Any] = {
-        path: reduce(lambda of, part: getattr(of, part, None), path.split("."), config) for path in FIELDS[name]
-    }
+    own = fields_of(config)
+    values = {path: field_value(config, path) for path in FIELDS[name] if path in own}
     return {path: value for path, value in values.items() if value}

@@ -1,6 +1,6 @@
 """Neurons, synapses, networks and the paper's peristalsis network; knows no engine and no body."""
 
-from annelid.lazy import moved
+from annelid.lazy import lazy
 from annelid.nervous.arrays import NO_GATE, NetworkArrays
 from annelid.nervous.functional_subnetworks import (
     Signals,
@@ -25,13 +25,9 @@ from annelid.nervous.network import Network
 from annelid.nervous.neurons import (
     Channel,
     ConnectionKind,
-    Firing,
     GapJunction,
     Gate,
-    Modulated,
-    ModulatorySynapse,
     Neuron,
-    SpikingSynapse,
     Synapse,
     persistent_sodium,
 )
@@ -44,7 +40,7 @@ from annelid.nervous.peristalsis import (
     neuron_names,
     peristalsis_network,
 )
-from annelid.nervous.stepper import Factors, GateStart, NetworkState, Scheme, Stepper
+from annelid.nervous.stepper import GateStart, NetworkState, Scheme, Stepper
 from annelid.nervous.toml import network_of_tables, network_tables
 from annelid.nervous.wiring import Connection
 
@@ -54,14 +50,10 @@ __all__ = [
     "Conductances",
     "Connection",
     "ConnectionKind",
-    "Factors",
-    "Firing",
     "GapJunction",
     "Gate",
     "GateStart",
     "HalfCentre",
-    "Modulated",
-    "ModulatorySynapse",
     "Network",
     "NetworkArrays",
     "NetworkState",
@@ -69,7 +61,6 @@ __all__ = [
     "PeristalsisParameters",
     "Scheme",
     "Signals",
-    "SpikingSynapse",
     "Stepper",
     "Synapse",
     "adaptive_half_centre",
@@ -94,4 +85,15 @@ __all__ = [
     "subtraction",
     "transmission",
 ]
-__getattr__ = moved(__name__, "annelid_studies.oscillators", "annelid_lab.sns_toolbox")
+_SPIKES = "neurons are graded: use a Synapse"
+_MODULATION = "nothing is modulated: excite or inhibit by a Synapse"
+__getattr__, __dir__ = lazy(
+    __name__,
+    {
+        "Firing": _SPIKES,
+        "SpikingSynapse": _SPIKES,
+        "Modulated": _MODULATION,
+        "ModulatorySynapse": _MODULATION,
+    },
+    ("annelid_studies.oscillators", "annelid_lab.sns_toolbox"),
+)

@@ -1,9 +1,9 @@
 """The compiled form of a network: frozen arrays, such that one matrix product sums every current.
 
 The right-hand side of every neuron is ``C dU/dt = I - G U``, where both the total conductance G and the current I at
-potential zero are linear in a *drive* vector: the open fractions of the presynaptic terminals, the releases of spiking
-synapses, the open fractions of the channels, the rectified differences and the plain potentials of gap junctions, the
-constant 1 and the inputs. So ``[G | I] = drive @ weights`` with one constant matrix.
+potential zero are linear in a *drive* vector: the open fractions of the presynaptic terminals and of the channels, the
+rectified differences and the plain potentials of gap junctions, the constant 1 and the inputs. So
+``[G | I] = drive @ weights`` with one constant matrix.
 """
 
 from __future__ import annotations
@@ -43,18 +43,6 @@ class NetworkArrays:
         channel_neuron: Neuron that bears each channel, ``(n_channels,)``.
         gates: The gates by slot and channel, slow slots first.
         n_slow: Number of slow slots.
-        firing_neuron: The neurons that spike, ``(n_firing,)``.
-        threshold_mV: Their resting thresholds, ``(n_firing,)``.
-        reset_mV: Their potentials after a spike, ``(n_firing,)``.
-        adaptation: Threshold gained per mV of depolarisation, ``(n_firing,)``.
-        adaptation_time_constant_ms: Shape ``(n_firing,)``.
-        rest_mV: Resting potentials of all neurons, ``(n_neurons,)``.
-        leak_conductance_uS: Leaks of all neurons, ``(n_neurons,)``.
-        release_source: For each distinct release, which of the firing neurons makes it, ``(n_releases,)``.
-        release_time_constant_ms: Shape ``(n_releases,)``.
-        release_increment: Shape ``(n_releases,)``.
-        modulated: Quantity and neuron of each modulation factor, ``n_modulated`` of them.
-        log_modulation: Logarithm of each factor when a terminal is open, ``(n_terminals, n_modulated)``.
         rectified_source: Higher side of each rectified gap junction, ``(n_rectified,)``.
         rectified_target: Its other side, same shape.
         drive: Where in the drive vector the entries of each kind lie.
@@ -73,18 +61,6 @@ class NetworkArrays:
     channel_neuron: NDArray[np.intp]
     gates: tuple[tuple[parts.Gate, ...], ...]
     n_slow: int
-    firing_neuron: NDArray[np.intp]
-    threshold_mV: Array
-    reset_mV: Array
-    adaptation: Array
-    adaptation_time_constant_ms: Array
-    rest_mV: Array
-    leak_conductance_uS: Array
-    release_source: NDArray[np.intp]
-    release_time_constant_ms: Array
-    release_increment: Array
-    modulated: tuple[tuple[parts.Modulated, int], ...]
-    log_modulation: Array
     rectified_source: NDArray[np.intp]
     rectified_target: NDArray[np.intp]
     drive: Mapping[str, slice]
@@ -101,23 +77,14 @@ def build_arrays(network: Wiring) -> NetworkArrays:
 
     ends = [(index[c.source], index[c.target], c.kind) for c in network.connections]
     synapses = [(pre, post, s) for pre, post, s in ends if isinstance(s, parts.Synapse)]
-    spiking = [(pre, post, s) for pre, post, s in ends if isinstance(s, parts.SpikingSynapse)]
-    modulatory = [(pre, post, s) for pre, post, s in ends if isinstance(s, parts.ModulatorySynapse)]
     rectified = [(pre, post, s) for pre, post, s in ends if isinstance(s, parts.GapJunction) and s.rectified]
     plain = [(pre, post, s) for pre, post, s in ends if isinstance(s, parts.GapJunction) and not s.rectified]
-    terminals = _numbered((pre, s.threshold_mV, s.saturation_mV) for pre, _, s in [*synapses, *modulatory])
-    releases = _numbered((pre, s.time_constant_ms, s.increment) for pre, _, s in spiking)
-    modulated: dict[tuple[parts.Modulated, int], int] = _numbered((m.quantity, post) for _, post, m in modulatory)
-    log_modulation = np.zeros((len(terminals), len(modulated)))
-    for pre, post, m in modulatory:
-        row = terminals[pre, m.threshold_mV, m.saturation_mV]
-        log_modulation[row, modulated[m.quantity, post]] += np.log(m.factor)
-    firing = {i: neuron.firing for i, neuron in enumerate(neurons) if neuron.firing is not None}
+    terminals = _numbered((pre, s.threshold_mV, s.saturation_mV) for pre, _, s in synapses)
     channels = [(i, channel) for i, neuron in enumerate(neurons) for channel in neuron.channels]
     gates, n_slow = _slots([channel for _, channel in channels])
 
-    kinds = ("terminals", "releases", "channels", "rectified", "potentials", "one", "inputs")
-    lengths = (len(terminals), len(releases), len(channels), len(rectified), n * bool(plain), 1, len(network.inputs))
+    kinds = ("terminals", "channels", "rectified", "potentials", "one", "inputs")
+    lengths = (len(terminals), len(channels), len(rectified), n * bool(plain), 1, len(network.inputs))
     ends = accumulate(lengths, initial=0)
     drive = {kind: slice(start, end) for kind, (start, end) in zip(kinds, pairwise(ends), strict=True)}
     weights = np.zeros((sum(lengths), 2 * n))
@@ -125,9 +92,8 @@ def build_arrays(network: Wiring) -> NetworkArrays:
     def rows(kind: str) -> tuple[Array, Array]:
         return weights[drive[kind], :n], weights[drive[kind], n:]
 
-    opened: dict[str, list[tuple[int, int, parts.Synapse | parts.SpikingSynapse | parts.Channel]]] = {
+    opened: dict[str, list[tuple[int, int, parts.Synapse | parts.Channel]]] = {
         "terminals": [(terminals[pre, s.threshold_mV, s.saturation_mV], post, s) for pre, post, s in synapses],
-        "releases": [(releases[pre, s.time_constant_ms, s.increment], post, s) for pre, post, s in spiking],
         "channels": [(row, neuron, channel) for row, (neuron, channel) in enumerate(channels)],
     }
     for kind, entries in opened.items():
@@ -166,18 +132,6 @@ def build_arrays(network: Wiring) -> NetworkArrays:
         channel_neuron=_frozen([neuron for neuron, _ in channels], np.intp),
         gates=gates,
         n_slow=n_slow,
-        firing_neuron=_frozen(list(firing), np.intp),
-        threshold_mV=_frozen([f.threshold_mV for f in firing.values()]),
-        reset_mV=_frozen([f.reset_mV for f in firing.values()]),
-        adaptation=_frozen([f.adaptation for f in firing.values()]),
-        adaptation_time_constant_ms=_frozen([f.adaptation_time_constant_ms for f in firing.values()]),
-        rest_mV=_frozen([neuron.rest_mV for neuron in neurons]),
-        leak_conductance_uS=_frozen([neuron.leak_conductance_uS for neuron in neurons]),
-        release_source=_frozen([list(firing).index(pre) for pre, _, _ in releases], np.intp),
-        release_time_constant_ms=_frozen([tau for _, tau, _ in releases]),
-        release_increment=_frozen([increment for _, _, increment in releases]),
-        modulated=tuple(modulated),
-        log_modulation=_frozen(log_modulation),
         rectified_source=_frozen([source for source, _, _ in rectified], np.intp),
         rectified_target=_frozen([target for _, target, _ in rectified], np.intp),
         drive=drive,

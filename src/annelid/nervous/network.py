@@ -54,7 +54,7 @@ class Network(Wiring):
     def stable_timestep_ms(self) -> float:
         """Returns the step above which an Euler step may overshoot and grow: the least ``2 C / G`` of all neurons.
 
-        G counts every synapse, channel and junction as fully open, and no modulation.
+        G counts every synapse, channel and junction as fully open.
 
         Raises:
             ConfigError: The network has no neurons.

@@ -1,4 +1,4 @@
-"""Neurons, spiking or not, with or without gated channels, and what joins them: synapses and gap junctions.
+"""Neurons, with or without gated channels, and what joins them: synapses and gap junctions.
 
 Potentials in mV (relative to rest unless a neuron says otherwise), conductances in uS, currents in nA,
 capacitances in nF, times in ms: a consistent set, since uS mV = nA and nF mV / ms = nA.
@@ -7,12 +7,12 @@ capacitances in nF, times in ms: a consistent set, since uS mV = nA and nF mV / 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Any, Literal, get_args
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.errors import ConfigError, require_finite, require_positive, suggest
+from annelid.errors import ConfigError, require_finite, require_positive
 
 Array = NDArray[np.float64]
 
@@ -112,42 +112,6 @@ class Channel:
 
 
 @dataclass(frozen=True, slots=True)
-class Firing:
-    """What makes a leaky integrator fire: a threshold, a reset, and a threshold that may adapt.
-
-    At the end of a step with ``U >= theta`` the neuron fires and U becomes the reset potential. The threshold follows
-    ``tau dtheta/dt = theta_0 - theta + adaptation (U - rest)``: a positive adaptation raises it with depolarisation,
-    so that a constant current fires ever more slowly, down to a steady rate. This is the spiking neuron of
-    SNS-Toolbox (Nourse et al. 2023), which resets to rest.
-
-    Under a constant current I without adaptation, ``U_inf = rest + I / Gm`` and the time between spikes is
-    ``C / Gm ln((U_inf - reset) / (U_inf - theta_0))``; below ``U_inf = theta_0`` the neuron is silent.
-
-    Attributes:
-        threshold_mV: theta_0, where the threshold starts and returns to.
-        reset_mV: Potential after a spike.
-        adaptation: Threshold gained per mV of lasting depolarisation; 0 for a fixed threshold.
-        adaptation_time_constant_ms: tau, time constant of the threshold.
-
-    Raises:
-        ConfigError: A number that is not finite, a reset at or above the threshold, or a time constant that is not
-            positive.
-    """
-
-    threshold_mV: float = 1.0
-    reset_mV: float = 0.0
-    adaptation: float = 0.0
-    adaptation_time_constant_ms: float = 5.0
-
-    def __post_init__(self) -> None:
-        _check_numbers("a firing neuron's", self, positive=("adaptation_time_constant_ms",))
-        if not self.reset_mV < self.threshold_mV:
-            raise ConfigError(
-                f"a firing neuron's reset_mV must be below its threshold_mV = {self.threshold_mV}, not {self.reset_mV}"
-            )
-
-
-@dataclass(frozen=True, slots=True)
 class Neuron:
     """A leaky integrator, ``C dU/dt = -Gm (U - rest) + bias + synapses + channels + inputs``.
 
@@ -157,7 +121,6 @@ class Neuron:
         rest_mV: Potential that the leak pulls to.
         bias_nA: Constant current.
         channels: Gated ion channels.
-        firing: Threshold and reset of a spiking neuron; None for a non-spiking one.
 
     Raises:
         ConfigError: A number that is not finite, a capacitance that is not positive, or a negative leak.
@@ -168,7 +131,6 @@ class Neuron:
     rest_mV: float = 0.0
     bias_nA: float = 0.0
     channels: tuple[Channel, ...] = ()
-    firing: Firing | None = None
 
     def __post_init__(self) -> None:
         _check_numbers("a neuron's", self, positive=("capacitance_nF",), not_negative=("leak_conductance_uS",))
@@ -201,9 +163,6 @@ def persistent_sodium(
     return Channel(conductance_uS, reversal_mV, (opening, closing))
 
 
-Modulated = Literal["leak", "channels", "membrane", "gates"]
-
-
 @dataclass(frozen=True, slots=True)
 class Synapse:
     """A graded chemical synapse, ``I = clip((U_pre - threshold) / (saturation - threshold), 0, 1) g (E - U)``.
@@ -228,7 +187,10 @@ class Synapse:
 
     def __post_init__(self) -> None:
         _check_numbers("a synapse's", self)
-        _check_opening("a synapse's", self)
+        if self.saturation_mV == self.threshold_mV:
+            raise ConfigError(
+                f"a synapse's saturation_mV must differ from its threshold_mV, both are {self.threshold_mV}"
+            )
 
 
 @dataclass(frozen=True, slots=True)
@@ -250,76 +212,5 @@ class GapJunction:
         _check_numbers("a gap junction's", self)
 
 
-@dataclass(frozen=True, slots=True)
-class SpikingSynapse:
-    """A synapse that conducts after each spike of its source: ``I = g s (E - U)``, the release s in [0, 1].
-
-    A spike makes s jump to ``min(s + increment, 1)`` at the end of the step in which it falls; between spikes
-    ``ds/dt = -s / tau``, of which every step takes the exact factor ``exp(-dt / tau)``. With increment 1 each spike
-    opens the synapse fully, as in SNS-Toolbox (Nourse et al. 2023).
-
-    Attributes:
-        conductance_uS: Largest conductance g.
-        reversal_mV: Reversal potential E.
-        time_constant_ms: tau of the decay.
-        increment: Jump of the release at a spike.
-
-    Raises:
-        ConfigError: A number that is not finite, a negative conductance, a time constant that is not positive, or an
-            increment outside (0, 1].
-    """
-
-    conductance_uS: float
-    reversal_mV: float
-    time_constant_ms: float = 1.0
-    increment: float = 1.0
-
-    def __post_init__(self) -> None:
-        _check_numbers("a spiking synapse's", self, positive=("time_constant_ms",))
-        if not 0 < self.increment <= 1:
-            raise ConfigError(f"a spiking synapse's increment must be above 0 and at most 1, not {self.increment}")
-
-
-@dataclass(frozen=True, slots=True)
-class ModulatorySynapse:
-    """A synapse that carries no current: its source scales a conductance or a time constant of its target.
-
-    The quantity is multiplied by ``factor ** a``, ``a = clip((U_pre - threshold) / (saturation - threshold), 0, 1)``:
-    by 1 while the source is silent, by the factor while it is saturated, and geometrically in between. Factors of
-    several modulatory synapses multiply in any order, and never change the quantity's sign. An own form, chosen for
-    these properties.
-
-    Attributes:
-        quantity: ``"leak"``: the leak conductance; ``"channels"``: the conductance of all gated channels;
-            ``"membrane"``: the capacitance, hence the membrane's time constant and nothing else; ``"gates"``: the
-            time constants of all slow gates.
-        factor: What a saturated source multiplies the quantity by.
-        threshold_mV: Presynaptic potential at which modulation begins.
-        saturation_mV: Presynaptic potential at which it is full.
-
-    Raises:
-        ConfigError: A number that is not finite, an unknown quantity, a factor that is not positive, or a saturation
-            equal to the threshold.
-    """
-
-    quantity: Modulated
-    factor: float
-    threshold_mV: float = 0.0
-    saturation_mV: float = 20.0
-
-    def __post_init__(self) -> None:
-        _check_numbers("a modulatory synapse's", self, positive=("factor",))
-        if self.quantity not in get_args(Modulated):
-            raise ConfigError(
-                f"unknown modulated quantity {self.quantity!r}: {suggest(self.quantity, get_args(Modulated))}"
-            )
-        _check_opening("a modulatory synapse's", self)
-
-
-ConnectionKind = Synapse | GapJunction | SpikingSynapse | ModulatorySynapse
+ConnectionKind = Synapse | GapJunction
 """Everything that can join two neurons."""
-
-
-def _check_opening(owner: str, synapse: Synapse | ModulatorySynapse) -> None:
-    if synapse.saturation_mV == synapse.threshold_mV:
-        raise ConfigError(f"{owner} saturation_mV must differ from its threshold_mV, both are {synapse.threshold_mV}")

@@ -223,14 +223,15 @@ def driven_robust_network(
     return network
 
 
-def add_motor_neurons(network: Network, n_segments: int, p: RobustParameters, let_go_ms: float) -> None:
-    """Adds ``motor_1`` .. ``motor_N``, which outlast the contraction neurons that excite them.
+def add_motor_neurons(network: Network, n_segments: int, p: RobustParameters, time_constant_ms: float) -> None:
+    """Adds ``motor_1`` .. ``motor_N`` and outputs of the same names, which outlast the contraction neurons.
 
-    They fall with the time constant ``let_go_ms`` and rise with a tenth of it. So a segment is still contracted while
+    They fall with the time constant and rise with a tenth of it. So a segment is still contracted while
     the next ones contract: several share the wave, the more the shorter the turns are.
     """
     leak = p.leak_conductance_uS
     charge = Synapse(_MOTOR_CHARGE * leak, p.range_mV, 0.0, p.range_mV)
     for segment in range(1, n_segments + 1):
-        network.add_neuron(f"motor_{segment}", Neuron(let_go_ms * leak, leak))
+        network.add_neuron(f"motor_{segment}", Neuron(time_constant_ms * leak, leak))
         network.add_synapse(f"contraction_{segment}", f"motor_{segment}", charge)
+        network.add_output(f"motor_{segment}", f"motor_{segment}")

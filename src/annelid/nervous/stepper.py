@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from annelid.errors import ConfigError, require_at_least, require_positive, suggest
 from annelid.nervous.arrays import NetworkArrays
-from annelid.nervous.neurons import Array, Modulated
+from annelid.nervous.neurons import Array
 
 Scheme = Literal["euler", "toolbox", "heun"]
 GateStart = Literal["steady", "toolbox"]
-Factors = tuple[NDArray[np.intp], NDArray[np.intp]]
-"""Places of the neurons or channels of which something is modulated, and the column of the factor of each."""
 
 # As arrays, numpy need not convert them at every call.
 _ZERO, _ONE = np.array(0.0), np.array(1.0)
@@ -30,20 +26,14 @@ class NetworkState:
         potential: Membrane potentials, mV, shape ``(n_worms, n_neurons)``.
         gate: Slow gates, shape ``(n_worms, n_slow, n_channels)``; a slot that a channel does not use stays
             constant.
-        threshold: Firing thresholds of the spiking neurons, mV, ``(n_worms, n_firing)``.
-        release: Releases of the spiking synapses, in [0, 1], ``(n_worms, n_releases)``.
-        fired: Which of the spiking neurons fired in the last step, ``(n_worms, n_firing)``.
     """
 
     potential: Array
     gate: Array
-    threshold: Array
-    release: Array
-    fired: NDArray[np.bool_]
 
     def copy(self) -> NetworkState:
         """Returns an independent copy."""
-        return NetworkState(*(getattr(self, field.name).copy() for field in fields(self)))
+        return NetworkState(self.potential.copy(), self.gate.copy())
 
 
 class Stepper:
@@ -68,13 +58,6 @@ class Stepper:
         gate_rate: Step over time constant of the slow gates, 0 in slots that are not used,
             ``(n_slow, n_worms, n_channels)``.
         weights: Those of the arrays, times the step over the capacitance of each neuron.
-        leak_step: Leak conductances times that, ``(n_neurons,)``.
-        threshold_rate: Step over time constant of the firing thresholds, ``(n_firing,)``.
-        release_decay: What is left of a release after a step, ``(n_releases,)``.
-        leak_factors: Neurons whose leak is modulated, and the columns of the factors.
-        membrane_factors: Likewise for the capacitance.
-        channel_factors: Channels whose conductance is modulated, and the columns of the factors.
-        gate_factors: Likewise for the time constants of their slow gates.
 
     Raises:
         ConfigError: An unknown scheme, or a step or number of copies that is not positive.
@@ -118,25 +101,10 @@ class Stepper:
         self.gate_rate = by_slot(np.array([0.0 if tau is None else dt / tau for tau in taus]), a.n_slow)
         membrane_rate = dt / a.capacitance_nF
         self.weights = a.weights * np.tile(membrane_rate, 2)
-        self.leak_step = a.leak_conductance_uS * membrane_rate
-        self.threshold_rate = dt / a.adaptation_time_constant_ms
-        self.release_decay = np.exp(-dt / a.release_time_constant_ms)
-
-        def factors(quantity: Modulated, neurons: Iterable[int]) -> Factors:
-            column = {neuron: column for column, (what, neuron) in enumerate(a.modulated) if what == quantity}
-            found = [(place, column[neuron]) for place, neuron in enumerate(neurons) if neuron in column]
-            places, columns = np.array(found, dtype=np.intp).reshape(-1, 2).T
-            return places, columns
-
-        self.leak_factors = factors("leak", range(len(a.neurons)))
-        self.membrane_factors = factors("membrane", range(len(a.neurons)))
-        self.channel_factors = factors("channels", a.channel_neuron.tolist())
-        self.gate_factors = factors("gates", a.channel_neuron.tolist())
 
         self._drive = drive = np.zeros((w, a.weights.shape[0]))
         drive[:, a.drive["one"]] = 1.0
         self._open = drive[:, a.drive["terminals"]]
-        self._release = drive[:, a.drive["releases"]]
         self._channel_open = drive[:, a.drive["channels"]]
         self._rectified = drive[:, a.drive["rectified"]]
         self._potentials = drive[:, a.drive["potentials"]]
@@ -166,13 +134,7 @@ class Stepper:
         for slot, row in enumerate(a.gates[: a.n_slow]):
             starts = [one.steady if gate_start == "steady" else one.toolbox_start for one in row]
             gate[slot] = [start(a.initial_mV[neuron]) for start, neuron in zip(starts, a.channel_neuron, strict=True)]
-        return NetworkState(
-            potential=np.tile(a.initial_mV, (w, 1)),
-            gate=np.tile(gate, (w, 1, 1)),
-            threshold=np.tile(a.threshold_mV, (w, 1)),
-            release=np.zeros((w, a.release_source.size)),
-            fired=np.zeros((w, a.firing_neuron.size), dtype=bool),
-        )
+        return NetworkState(np.tile(a.initial_mV, (w, 1)), np.tile(gate, (w, 1, 1)))
 
     def advance(self, state: NetworkState, inputs_nA: Array | None = None, n_steps: int = 1) -> None:
         """Advances a state, in place.
@@ -184,11 +146,8 @@ class Stepper:
             n_steps: Number of steps; bit for bit the same as so many calls.
         """
         potential, gate = state.potential, state.gate.swapaxes(0, 1)
-        spiking = state.fired.size
         self._inputs[...] = 0.0 if inputs_nA is None else inputs_nA
         for _ in range(n_steps):
-            if spiking:
-                self._release[...] = state.release
             gate_step = self._gate_step(potential, gate)
             if self.scheme == "toolbox":
                 gate += gate_step
@@ -201,11 +160,7 @@ class Stepper:
                     gate_step = (gate_step + self._gate_step(potential_ahead, gate_ahead)) * 0.5
                     potential_step = (potential_step + self._potential_step(potential_ahead, gate_ahead)) * 0.5
                 gate += gate_step
-            if spiking:
-                self._adapt_thresholds(state)
             potential += potential_step
-            if spiking:
-                self._fire(state)
 
     def outputs(self, state: NetworkState) -> Array:
         """Returns the potentials that the outputs read, mV, shape ``(n_worms, n_outputs)``."""
@@ -237,16 +192,12 @@ class Stepper:
         np.add(seen, self.affine_offset, seen)
         np.maximum(self._opening, _ZERO, out=self._opening)
         np.minimum(self._opening, _ONE, out=self._open)
-        if self.arrays.modulated:
-            self._modulation = np.exp(np.matmul(self._open[:, np.newaxis], self.arrays.log_modulation)[:, 0])
         np.exp(y, y)
         np.square(y, q)
         np.add(q, _ONE, q)
         step = self._q_slow * gate
         np.subtract(_ONE, step, step)
         np.multiply(step, self.gate_rate / self._y_slow, step)
-        if self.gate_factors[0].size:
-            self._scale(np.divide, step, self.gate_factors)
         return step
 
     def _potential_step(self, potential: Array, gate: Array) -> Array:
@@ -265,15 +216,8 @@ class Stepper:
         else:
             # One product of a vector and the matrix per copy.
             np.matmul(self._drive[:, np.newaxis], self.weights, self._total[:, np.newaxis])
-        neurons, columns = self.leak_factors
-        if neurons.size:
-            more = self.leak_step[neurons] * (self._modulation[:, columns] - 1.0)
-            self._conductance[:, neurons] += more
-            self._current[:, neurons] += more * a.rest_mV[neurons]
         step = self._conductance * potential
         np.subtract(self._current, step, step)
-        if self.membrane_factors[0].size:
-            self._scale(np.divide, step, self.membrane_factors)
         return step
 
     def _open_channels(self, gate: Array) -> None:
@@ -285,26 +229,3 @@ class Stepper:
             if self._power is not None:
                 open_gates **= self._power
             np.multiply.reduce(open_gates, axis=0, out=self._channel_open)
-        if self.channel_factors[0].size:
-            self._scale(np.multiply, self._channel_open, self.channel_factors)
-
-    def _scale(self, apply: np.ufunc, values: Array, factors: Factors) -> None:
-        """Multiplies or divides columns of values by modulation factors, in place."""
-        places, columns = factors
-        values[..., places] = apply(values[..., places], self._modulation[:, columns])
-
-    def _adapt_thresholds(self, state: NetworkState) -> None:
-        """Takes the thresholds' Euler step, from the potentials before this step."""
-        a = self.arrays
-        depolarisation = state.potential[:, a.firing_neuron] - a.rest_mV[a.firing_neuron]
-        state.threshold += self.threshold_rate * (a.threshold_mV - state.threshold + a.adaptation * depolarisation)
-
-    def _fire(self, state: NetworkState) -> None:
-        """Resets the neurons at or above their thresholds, and lets their synapses release."""
-        a = self.arrays
-        reached = state.potential[:, a.firing_neuron]
-        np.greater_equal(reached, state.threshold, out=state.fired)
-        state.potential[:, a.firing_neuron] = np.where(state.fired, a.reset_mV, reached)
-        state.release *= self.release_decay
-        state.release += a.release_increment * state.fired[:, a.release_source]
-        np.minimum(state.release, 1.0, out=state.release)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Literal
 
 from annelid.markdown import Table, plain_table, words
-from annelid.nervous.neurons import ConnectionKind, GapJunction, ModulatorySynapse, Neuron, SpikingSynapse
+from annelid.nervous.neurons import GapJunction, Neuron, Synapse
 from annelid.nervous.wiring import Connection, Wiring
 
-Effect = Literal["excitatory", "inhibitory", "modulatory", "gap junction", "rectified gap junction"]
+Effect = Literal["excitatory", "inhibitory", "gap junction", "rectified gap junction"]
 
 
 def effect_of(network: Wiring, connection: Connection) -> Effect:
@@ -16,8 +16,6 @@ def effect_of(network: Wiring, connection: Connection) -> Effect:
     kind = connection.kind
     if isinstance(kind, GapJunction):
         return "rectified gap junction" if kind.rectified else "gap junction"
-    if isinstance(kind, ModulatorySynapse):
-        return "modulatory"
     return "excitatory" if kind.reversal_mV > network.neurons[connection.target].rest_mV else "inhibitory"
 
 
@@ -49,27 +47,17 @@ def markdown_tables(network: Wiring) -> str:
 
 
 def _specials(neuron: Neuron) -> str:
-    words = [
+    return "; ".join(
         f"channel {channel.conductance_uS:g} uS to {channel.reversal_mV:g} mV, "
         + (f"{len(channel.gates)} gates" if len(channel.gates) != 1 else "1 gate")
         + "".join(f", tau {gate.time_constant_ms:g} ms" for gate in channel.slow_gates)
         for channel in neuron.channels
-    ]
-    if neuron.firing is not None:
-        words.append(f"fires at {neuron.firing.threshold_mV:g} mV, reset to {neuron.firing.reset_mV:g} mV")
-        if neuron.firing.adaptation:
-            words[-1] += f", adaptation {neuron.firing.adaptation:g}"
-    return "; ".join(words)
+    )
 
 
-def _numbers(kind: ConnectionKind) -> tuple[str, str, str]:
+def _numbers(kind: Synapse | GapJunction) -> tuple[str, str, str]:
     """Returns conductance, reversal potential and what else a connection has."""
     if isinstance(kind, GapJunction):
         return f"{kind.conductance_uS:.6g}", "", ""
-    if isinstance(kind, SpikingSynapse):
-        also = f"tau {kind.time_constant_ms:g} ms, increment {kind.increment:g}"
-        return f"{kind.conductance_uS:.6g}", f"{kind.reversal_mV:g}", also
     reach = f"{kind.threshold_mV:g} to {kind.saturation_mV:g} mV"
-    if isinstance(kind, ModulatorySynapse):
-        return "", "", f"{kind.quantity} × {kind.factor:g}, {reach}"
     return f"{kind.conductance_uS:.6g}", f"{kind.reversal_mV:g}", reach

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import MISSING, asdict, fields
-from functools import partial
 from typing import Any, TypeVar
 
 from annelid.errors import ConfigError, require_finite, shown, suggest
@@ -21,10 +20,10 @@ Built = TypeVar("Built", bound=Wiring)
 KINDS: dict[str, type[neurons.ConnectionKind]] = {
     "synapse": neurons.Synapse,
     "gap_junction": neurons.GapJunction,
-    "spiking_synapse": neurons.SpikingSynapse,
-    "modulatory_synapse": neurons.ModulatorySynapse,
 }
 """What a connection's ``kind`` is called in the text."""
+GONE = {"firing", "spiking_synapse", "modulatory_synapse"}
+"""What older texts may have: neurons that spike, and modulation."""
 
 
 def write_network(network: Wiring) -> str:
@@ -73,6 +72,8 @@ def network_of_tables(document: Mapping[str, Any], make: type[Built]) -> Built:
         network.add_neuron(name, _build(neurons.Neuron, {"name", "initial_mV"}, entry, place), initial)
     for place, entry in _tables(document, "connection"):
         source, target, kind = _strings(entry, place, "source", "target", "kind")
+        if kind in GONE:
+            raise ConfigError(f"{place}: kind {shown(kind)} has been removed: neurons neither spike nor modulate")
         if kind not in KINDS:
             raise ConfigError(f"{place}: unknown kind {shown(kind)}: {suggest(kind, KINDS)}")
         built = _build(KINDS[kind], {"source", "target", "kind"}, entry, place)
@@ -113,6 +114,8 @@ def _tables(document: Mapping[str, Any], key: str) -> Iterator[tuple[str, Mappin
 
 def _refuse_unknown(entry: Mapping[str, Any], known: Collection[str], place: str) -> None:
     for key in entry:
+        if key in GONE:
+            raise ConfigError(f"{place}: {key} has been removed: neurons do not spike")
         if key not in known:
             raise ConfigError(f"{place}: unknown field {shown(key)}: {suggest(key, known)}")
 
@@ -159,8 +162,6 @@ def _several(kind: type) -> Callable[[Any, str], Any]:
 _READERS: dict[str, Callable[[Any, str], Any]] = {
     "channels": _several(neurons.Channel),
     "gates": _several(neurons.Gate),
-    "firing": partial(_build, neurons.Firing, ()),
-    "quantity": _string,
     "rectified": _of_type(bool, "true or false"),
 }
 """How fields are read that are no numbers."""

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from annelid.errors import ConfigError, require_finite, shown, suggest
-from annelid.nervous.neurons import ConnectionKind, GapJunction, ModulatorySynapse, Neuron, SpikingSynapse, Synapse
+from annelid.nervous.neurons import ConnectionKind, GapJunction, Neuron, Synapse
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,8 +51,8 @@ class Wiring:
         self.neurons[name] = neuron
         self.initial_mV[name] = neuron.rest_mV if initial_mV is None else float(initial_mV)
 
-    def add_synapse(self, source: str, target: str, synapse: Synapse | SpikingSynapse | ModulatorySynapse) -> None:
-        """Adds a graded, spiking or modulatory synapse; currents of several add up, factors of modulation multiply.
+    def add_synapse(self, source: str, target: str, synapse: Synapse) -> None:
+        """Adds a synapse; currents of several add up.
 
         Args:
             source: Name of the presynaptic neuron.
@@ -60,12 +60,9 @@ class Wiring:
             synapse: Its properties.
 
         Raises:
-            ConfigError: No neuron has one of the names (the sentence suggests the nearest), or the source of a
-                spiking synapse does not spike.
+            ConfigError: No neuron has one of the names; the sentence suggests the nearest.
         """
         self._require_neurons(source, target)
-        if isinstance(synapse, SpikingSynapse) and self.neurons[source].firing is None:
-            raise ConfigError(f"neuron {source!r} has no firing, and a spiking synapse needs a source that spikes")
         self.connections.append(Connection(source, target, synapse))
 
     def add_gap_junction(self, source: str, target: str, junction: GapJunction) -> None:

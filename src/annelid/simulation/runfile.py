@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic import ValidationError
 
-from annelid.config import REPLACED, RunConfig, field_value, fields_of, has_field
+from annelid.config import CONSTANT, REPLACED, RunConfig, field_value, fields_of, has_field
 from annelid.errors import ConfigError, RunFileError, UnreadableText
 from annelid.registry import Registry
 from annelid.simulation import digest
@@ -169,7 +169,8 @@ def _without_gone_fields(data: xarray.Dataset) -> xarray.Dataset:
             if field not in section or has_field(path, tree):
                 continue
             value = section.pop(field)
-            if value and (field != "pin_inertance_kg" or section.get("pins") == "separate"):
+            acted = value and value != CONSTANT.get(path)
+            if acted and (field != "pin_inertance_kg" or section.get("pins") == "separate"):
                 warnings.append(f"{path} was {value}, a field that is gone ({instead}): its command does not repeat it")
         if tree["body"].get("strands", {}).get("damping_time_s", 0.0) is None:
             del tree["body"]["strands"]["damping_time_s"]

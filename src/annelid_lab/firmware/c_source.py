@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from importlib.metadata import version
 from importlib.resources import files
+from itertools import chain
 from pathlib import Path
 from string import Template
 from typing import Any, Literal
@@ -15,10 +16,11 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from annelid.control import SENSED, ControllerCode
+from annelid.control import SENSED, CircuitController
 from annelid.errors import ConfigError, RunFileError
-from annelid.nervous import NO_GATE, Factors, Network, NetworkState, Scheme
+from annelid.nervous import NO_GATE, Network, NetworkState, Scheme, Stepper
 from annelid.output import write_text
+from annelid.protocols import SteeringCode
 from annelid.text import numbered
 
 Real = Literal["double", "float"]
@@ -123,18 +125,21 @@ def comment(text: str) -> str:
 
 
 class Writer:
-    """Fills the templates with one network and controller."""
+    """Fills the templates with a network, and with the circuit that it is of and its steering, if any."""
 
     def __init__(
         self,
-        code: ControllerCode,
+        network: Network,
+        stepper: Stepper,
         start: NetworkState,
         real: Real,
         title: str,
         vectors: Vectors,
+        controller: CircuitController | None = None,
+        steering: SteeringCode | None = None,
     ) -> None:
-        self._network, self._stepper, self._start = code.network, code.stepper, start
-        self._code, self._vectors = code, vectors
+        self._network, self._stepper, self._start, self._vectors = network, stepper, start, vectors
+        self._controller, self._steering = controller, steering or SteeringCode()
         self._real: Real = real
         self._title = comment(title)
         name = identifier(title.strip(), LONGEST_NAME).strip("_").lower() or "network"
@@ -143,8 +148,8 @@ class Writer:
 
     def firmware(self, returned: str, n_returned: int) -> Firmware:
         """Returns the three texts."""
-        # Also names the tables, and whether there is any of each sort of things.
-        words = self._network_words() | self._interface_words(returned, n_returned)
+        words = self._network_words() | self._circuit_words() | self._interface_words(returned, n_returned)
+        words["tables"] = "\n".join(self._tables)
         header = filled("firmware.h.txt", words)
         body = filled("firmware.c.txt", words | {"includes": "", "macros": "", "functions": ""})
         used = sorted(set(_INTERFACE.findall(body)))
@@ -202,35 +207,9 @@ class Writer:
         if slow:
             rates = [stepper.gate_rate[slot, 0, channel] for slot, channel in slow]
             self._table("gate_rate", np.array(rates), "step over time constant of the slow gates")
-        factors = {
-            "gate_factors": self._gate_factors(slow),
-            "channel_factors": _pairs(stepper.channel_factors),
-            "leak_factors": _pairs(stepper.leak_factors),
-            "membrane_factors": _pairs(stepper.membrane_factors),
-        }
-        if a.modulated:
-            self._sparse("modulation", a.log_modulation.T, "terminal", {"log": a.log_modulation.T})
-        for name, pairs_of in factors.items():
-            if len(pairs_of):
-                self._table(name[:-1], pairs_of, "what is modulated, and the column of its factor")
-        if len(factors["leak_factors"]):
-            modulated = factors["leak_factors"][:, 0]
-            self._table("leak_step", stepper.leak_step[modulated], "leak times step over capacitance")
-            self._table("leak_rest", a.rest_mV[modulated])
         if len(a.rectified_source):
             self._table("rectified_source", a.rectified_source, "higher sides of rectified gap junctions")
             self._table("rectified_target", a.rectified_target)
-        if len(a.firing_neuron):
-            self._table("firing_neuron", a.firing_neuron, "neurons that spike")
-            self._table("firing_rest", a.rest_mV[a.firing_neuron])
-            self._table("threshold_rate", stepper.threshold_rate, "step over time constant of the thresholds")
-            self._table("threshold_start", a.threshold_mV)
-            self._table("adaptation", a.adaptation)
-            self._table("reset", a.reset_mV, "potentials after a spike")
-        if len(a.release_source):
-            self._table("release_source", a.release_source, "which of these makes each release")
-            self._table("release_decay", stepper.release_decay)
-            self._table("release_increment", a.release_increment)
         is_sparse = self._weights(stepper.weights, n)
         raised = "raised(%s, gate_power[i])" if whole else "POW(%s, gate_power[i])"
         slow_power, instant_power = "gate[i]", "1 / gate_sum[i]"
@@ -243,11 +222,7 @@ class Writer:
             "n_channels": n_channels,
             "n_gates": len(gates),
             "n_slow": len(slow),
-            "n_modulated": len(a.modulated),
             "n_rectified": len(a.rectified_source),
-            "n_firing": len(a.firing_neuron),
-            "n_releases": len(a.release_source),
-            **{f"n_{name}": len(pairs_of) for name, pairs_of in factors.items()},
         }
         flags = {
             "terminals": n_terminals,
@@ -257,18 +232,14 @@ class Writer:
             "heun": stepper.scheme == "heun",
             "toolbox": stepper.scheme == "toolbox",
             "gates_last": slow and stepper.scheme != "toolbox",
-            "modulated": a.modulated,
             "raised": not plain and whole,
             "nothing_seen": not n_terminals and not gates,
             "pairs": pairs,
             "products": n_channels and not pairs,
             "rectified": len(a.rectified_source),
             "potentials": a.drive["potentials"].stop > at["potentials"],
-            "firing": len(a.firing_neuron),
-            "releases": len(a.release_source),
             "sparse": is_sparse,
             "dense": not is_sparse,
-            **{name: len(pairs_of) for name, pairs_of in factors.items()},
         }
         drive_words = ", ".join(kind for kind, part in a.drive.items() if part.stop > part.start)
         return {
@@ -281,17 +252,10 @@ class Writer:
             "gate_parameter": ", const real *gate" if slow else "",
             "gate_now": ", now.gate" if slow else "",
             "gate_ahead": ", gate_ahead" if slow else "",
-            "tables": "\n".join(self._tables),
             "neurons": self._labelled("NEURON", a.neurons, [_of_neuron(self._network, name) for name in a.neurons]),
             "size": f"{n} neurons, {len(self._network.connections)} connections, currents by a "
             f"{'sparse' if is_sparse else 'dense'} table.",
         }
-
-    def _gate_factors(self, slow: Sequence[tuple[int, int]]) -> NDArray[np.intp]:
-        """Slow gates that are modulated, each with the column of its factor."""
-        column = dict(_pairs(self._stepper.gate_factors).tolist())
-        found = [(place, column[channel]) for place, (_, channel) in enumerate(slow) if channel in column]
-        return np.array(found, dtype=np.intp).reshape(-1, 2)
 
     def _weights(self, weights: NDArray[np.float64], n: int) -> bool:
         """Writes the weights in the smaller form, and returns whether that is the sparse one."""
@@ -301,22 +265,17 @@ class Writer:
         index = _index_type(max(len(weights), int(used.sum())))[1]
         is_sparse = int(used.sum()) * (2 * number + index) + (n + 1) * index < weights.size * number
         if is_sparse:
-            self._sparse("drive", used, "source", {"conductance": conductance, "current": current})
+            # The entries of each neuron that are used, one neuron after the other.
+            neurons, sources = np.nonzero(used)
+            first = np.searchsorted(neurons, np.arange(n + 1))
+            self._table("drive_first", first, "where the entries of each neuron begin")
+            self._table("drive_source", sources)
+            self._table("drive_conductance", conductance[used], "times dt / C")
+            self._table("drive_current", current[used], "times dt / C")
         else:
             self._table("drive_conductance", conductance, "dt / C times conductances, by neuron and drive")
             self._table("drive_current", current, "dt / C times currents")
         return is_sparse
-
-    def _sparse(self, name: str, used: NDArray[Any], column: str, values: Mapping[str, NDArray[Any]]) -> None:
-        """Writes the entries of each row that are used, one row after the other."""
-        rows, columns = np.nonzero(used)
-        first = np.searchsorted(rows, np.arange(len(used) + 1))
-        self._table(
-            f"{name}_first", first, f"where the entries of each {'neuron' if name == 'drive' else 'factor'} begin"
-        )
-        self._table(f"{name}_{column}", columns)
-        for value, dense in values.items():
-            self._table(f"{name}_{value}", dense[rows, columns], "times dt / C" if name == "drive" else "")
 
     def _table(self, name: str, values: ArrayLike, meaning: str = "") -> None:
         array = np.asarray(values)
@@ -361,51 +320,86 @@ class Writer:
         prefix = f"{self._name.upper()}_{kind}"
         return "\n".join(f"    {prefix}_{label}, /* {comment(name)}: {meaning} */" for label, name, meaning in lines)
 
-    # What they have of the controller.
+    # What they have of the circuit.
+
+    def _circuit_words(self) -> dict[str, Any]:
+        names = ("sensing", "linear", "switches", "windows", "expanding", "sigmoid", "line")
+        words: dict[str, Any] = dict.fromkeys(names, False) | {"controller": self._controller is not None}
+        words |= {"n_segments": 0, "n_muscles": 0, "per_segment": 0, "n_linear": 0, "n_switches": 0, "read_out": ""}
+        if self._controller is None:
+            outputs = enumerate(self._stepper.arrays.output_neuron.tolist())
+            lines = [f"    activation->output_mV[{place}] = now.potential_mV[{neuron}];" for place, neuron in outputs]
+            return words | {"read_out": "\n".join(lines) or "    activation->output_mV[0] = 0;"}
+        circuit, table, readout = self._controller.circuit, self._controller.table, self._controller.circuit.readout
+        sensed = [[place for place in row if place < self._n_sensed] for row in table.place.tolist()]
+        if sensed:
+            self._table("row_input", table.input, "inputs that are set, first by what rises linearly, then by switches")
+            self._table("row_first", np.cumsum([0, *map(len, sensed)]), "where the places of what each senses begin")
+            self._table("row_place", np.array([*chain(*sensed), 0]), "places in the struct of what is sensed")
+            self._table("row_gain", table.gain, "nA")
+            self._table("row_threshold", table.threshold)
+        if table.n_linear:
+            self._table("row_span", table.span[: table.n_linear])
+            self._table("row_least", table.least[: table.n_linear])
+            self._table("row_most", table.most[: table.n_linear])
+        if n_switches := len(table.hysteresis):
+            self._table("switch_hysteresis", table.hysteresis)
+        if windows := bool(table.first.any() or table.end.any()):
+            self._table("row_begin", table.first, "steps from which on they act")
+            self._table("row_end", table.end, "steps from which on they do not, 0 for always")
+        self._table("contracting", circuit.places(readout.contracting), "neurons that the activation goes by")
+        if readout.expanding:
+            self._table("expanding", circuit.places(readout.expanding), "neurons that are taken off")
+        if readout.slope_per_mV is not None:
+            self._table("slope_per_mV", np.array(readout.slope_per_mV))
+        else:
+            for name, number in zip(("low_mV", "high_mV", "length_mV", "offset"), readout.line, strict=True):
+                self._table(f"line_{name}", np.array(number))
+        for name, value in self._steering.constants.items():
+            self._table(name, value)
+        return words | {
+            "sensing": len(sensed) > 0,
+            "linear": table.n_linear > 0,
+            "switches": n_switches > 0,
+            "windows": windows,
+            "expanding": bool(readout.expanding),
+            "sigmoid": readout.slope_per_mV is not None,
+            "line": readout.slope_per_mV is None,
+            "n_segments": circuit.n_segments,
+            "n_muscles": circuit.n_segments * self._controller.muscles_per_segment,
+            "per_segment": self._controller.muscles_per_segment,
+            "n_linear": table.n_linear,
+            "n_switches": n_switches,
+        }
+
+    @property
+    def _n_sensed(self) -> int:
+        """Numbers that the circuit senses, which come first in the struct."""
+        assert self._controller is not None
+        circuit = self._controller.circuit
+        return sum(int(np.prod(SENSED[name].shape(circuit.n_segments))) for name in circuit.senses)
 
     def _interface_words(self, returned: str, n_returned: int) -> dict[str, Any]:
-        code, network, name = self._code, self._network, self._name
-        prefix, a = name.upper(), self._stepper.arrays
+        network, name, a = self._network, self._name, self._stepper.arrays
+        prefix, real, n_inputs = name.upper(), f"{name}_real", len(network.inputs)
         targets = [", ".join(map(comment, each)) for each in network.inputs.values()]
-        is_controller = returned == "activation"
-        n_inputs = len(network.inputs)
-        real = f"{name}_real"
+        is_controller, sensed = self._controller is not None, self._vectors.sensed[0]
         sensors = [
             f"    {real} {field}{_lengths(value)}; /* {SENSED[field].meaning if field in SENSED else 'by input'} */"
-            for field, value in self._vectors.sensed[0].items()
+            for field, value in sensed.items()
         ]
-        state = {label: np.asarray(value) for label, value in code.state.items()}
-        fields = [f"    {real} {label}{_lengths(value)};" for label, value in state.items()]
+        state: dict[str, NDArray[Any]] = {}
+        if self._controller is not None and (n_switches := len(self._controller.table.hysteresis)):
+            state["sensor_on"] = np.zeros(n_switches)
+        state |= {label: np.asarray(value) for label, value in self._steering.state.items()}
         parts = [("potential_mV", self._start.potential[0])]
-        if self._gates and self._stepper.arrays.n_slow:
-            slow = [(slot, channel) for slot, channel in self._gates if slot < a.n_slow]
+        slow = [(slot, channel) for slot, channel in self._gates if slot < a.n_slow]
+        if slow:
             parts.append(("gate", np.array([self._start.gate[0, slot, channel] for slot, channel in slow])))
-        if len(a.firing_neuron):
-            parts += [("threshold_mV", self._start.threshold[0]), ("fired", self._start.fired[0].astype(int))]
-        if len(a.release_source):
-            parts.append(("release", self._start.release[0]))
         start = [f"    {self._values(value)}, /* {label} */" for label, value in [*parts, *state.items()]]
-        constants = []
-        for label, value in code.constants.items():
-            array = np.asarray(value)
-            kind = "real" if array.dtype.kind == "f" else "unsigned long"
-            constants.append(f"static const {kind} {label}{_lengths(array)} = {self._values(array)};")
-        step = [*(["    static real input_nA[N_INPUTS];"] if is_controller and n_inputs else [])]
-        body = f"{code.inputs}\n{code.activation}"
-        step += [f"    int {letter};" for letter in "ij" if re.search(rf"\bfor \({letter} ", body)]
-        argument = "input_nA" if n_inputs else "0"
-        step += [code.inputs.strip("\n")] if code.inputs else []
-        step += [
-            f"    network_step({argument if is_controller else 'sensors->input_nA'});",
-            code.activation.strip("\n"),
-        ]
-        if not self._vectors.sensed[0]:
-            step.append("    (void)sensors;")
         (tolerance_mV, late), vectors = TOLERANCES[self._real], self._vectors
         potential, back = np.array(vectors.potential)[:, -late - 1 :], np.array(vectors.returned)[:, -late - 1 :]
-        sensed = ",\n".join(
-            "    {" + ", ".join(self._values(value) for value in block.values()) + "}" for block in self._vectors.sensed
-        )
+        blocks = [", ".join(self._values(value) for value in block.values()) or "0" for block in vectors.sensed]
         return {
             "title": self._title,
             "name": name,
@@ -419,24 +413,21 @@ class Writer:
             "outputs": self._labelled("OUTPUT", list(network.outputs), [comment(s) for s in network.outputs.values()]),
             "n_outputs": len(network.outputs),
             "sizes": f"\n#define {prefix}_N_MUSCLES {n_returned}\n" if is_controller else "",
-            "sensors": "\n".join(sensors),
+            "sensors": "\n".join(sensors) or f"    {real} nothing;",
             "activation": f"    {real} {returned}[{n_returned}]; /* {_RETURNED[returned]} */",
-            "state": "\n".join(fields),
+            "state": "\n".join(f"    {real} {label}{_lengths(value)};" for label, value in state.items()),
             "start": "\n".join([*start, "    0 /* n_steps */"]),
-            "controller": is_controller,
             "any_inputs": n_inputs > 0,
             "no_inputs": n_inputs == 0,
-            "n_segments": code.n_segments,
-            "n_muscles": code.n_muscles,
-            "constants": "\n".join(constants),
-            "helpers": code.helpers,
-            "clipped": "clipped(" in body,
-            "step": "\n".join(step),
+            "given": "input_nA" if is_controller and n_inputs else "sensors->input_nA" if sensed and n_inputs else "0",
+            "nothing_sensed": not sensed or (not is_controller and not n_inputs),
+            "helpers": self._steering.helpers,
+            "steering": self._steering.statements.strip("\n"),
             "n_steps": N_BLOCKS * STEPS,
             "n_blocks": N_BLOCKS,
             "steps": STEPS,
             "n_returned": n_returned,
-            "sensed": "{\n" + sensed + "\n}",
+            "sensed": "{\n" + ",\n".join(f"    {{{block}}}" for block in blocks) + "\n}",
             "lowest_mV": self._values(potential.min(axis=1)),
             "highest_mV": self._values(potential.max(axis=1)),
             "lowest": self._values(back.min(axis=1)),
@@ -455,10 +446,6 @@ def _lengths(value: ArrayLike) -> str:
     return "".join(f"[{length}]" for length in np.shape(value))
 
 
-def _pairs(factors: Factors) -> NDArray[np.intp]:
-    return np.stack(factors, axis=1)
-
-
 def _index_type(most: int) -> tuple[str, int]:
     """The smallest type of a place, and its bytes."""
     return next(
@@ -473,8 +460,6 @@ def _of_neuron(network: Network, name: str) -> str:
         kinds.append(f"bias {neuron.bias_nA:g} nA")
     if neuron.channels:
         kinds.append(f"{len(neuron.channels)} gated channel{'s' if len(neuron.channels) > 1 else ''}")
-    if neuron.firing is not None:
-        kinds.append("spikes")
     return ", ".join(kinds)
 
 

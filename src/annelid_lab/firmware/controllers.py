@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from annelid.control import SENSED, Coded, ControllerCode
-from annelid.errors import ConfigError
+from annelid.control import SENSED, CircuitController, TurningController
+from annelid.errors import ConfigError, shown
 from annelid.nervous import Network, Scheme
-from annelid.protocols import Controller, Sensation
+from annelid.protocols import Controller, Sensation, SteeringCode
 from annelid_lab.firmware.c_source import N_BLOCKS, STEPS, Firmware, Real, Vectors, Writer, filled
 from annelid_lab.loop.frames import MOST_STEPS, VERSION, Interface, most_stuffed
 
@@ -30,43 +30,43 @@ def network_firmware(
         ConfigError: As of `Network.compile`, or a number is too large for the type.
     """
     stepper, n_outputs = network.compile(timestep_ms, scheme), len(network.outputs)
-    lines = enumerate(stepper.arrays.output_neuron.tolist())
-    returned = [f"    activation->output_mV[{place}] = now.potential_mV[{neuron}];" for place, neuron in lines]
     state = stepper.initial_state()
-    code = ControllerCode(
-        network, stepper, state, activation="\n".join(returned) or "    activation->output_mV[0] = 0;"
-    )
     start, vectors = state.copy(), Vectors()
     for row in np.random.default_rng(0).uniform(-5.0, 20.0, (N_BLOCKS, max(len(network.inputs), 1))):
         trace = stepper.run(np.tile(row[: len(network.inputs)], (STEPS, 1)), state)[1:, 0]
         vectors.add(
             {"input_nA": row}, trace, trace[:, stepper.arrays.output_neuron] if n_outputs else np.zeros((STEPS, 1))
         )
-    writer = Writer(code, start, real, network.name, vectors)
+    writer = Writer(network, stepper, start, real, network.name, vectors)
     return writer.firmware("output_mV", max(n_outputs, 1))
 
 
 def controller_firmware(controller: Controller, name: str = "controller", *, real: Real = "double") -> Firmware:
-    """Writes a controller as C99, with its network, its sensors, its start, its turning and its activation.
+    """Writes a circuit as C99: what it senses, its network, its readout, and its turning, if any.
 
     Args:
-        controller: A controller that steps a network; it is reset.
+        controller: A controller that is a circuit, turned or not; it is reset.
         name: What to call it.
         real: Type of all numbers.
 
     Raises:
         ConfigError: The controller cannot be written as C, or a number is too large for the type.
     """
-    controller = _coded(controller)
+    circuit, steering = _parts(controller)
+    if circuit.table.functions:
+        place, _ = circuit.table.functions[0]
+        name = list(circuit.circuit.network.inputs)[place]
+        raise ConfigError(f"input {shown(name)} is set by a function of Python, which is not written as C")
     controller.reset(0)
-    code = controller.code()
-    start = code.network_state.copy()
-    vectors = _controller_vectors(controller, code)
+    start, senses = circuit.network_state.copy(), tuple(dict.fromkeys((*circuit.senses, *steering.senses)))
+    vectors = _controller_vectors(controller, circuit, senses)
     controller.reset(0)
-    firmware = Writer(code, start, real, name, vectors).firmware("activation", code.n_muscles)
+    network, n_muscles = circuit.circuit.network, circuit.n_segments * circuit.muscles_per_segment
+    writer = Writer(network, circuit.stepper, start, real, name, vectors, circuit, steering)
+    firmware = writer.firmware("activation", n_muscles)
     # A very long worm has more numbers than a frame holds, and goes without.
     with suppress(ConfigError):
-        interface = Interface(code.senses, code.n_segments, code.n_muscles, round(1e3 * code.stepper.timestep_ms))
+        interface = Interface(senses, circuit.n_segments, n_muscles, round(1e3 * circuit.stepper.timestep_ms))
         firmware = replace(firmware, wire=_wire(firmware.name, interface))
     return firmware
 
@@ -94,29 +94,33 @@ def controller_network(controller: Controller) -> Network:
     Raises:
         ConfigError: The controller steps none.
     """
-    return _coded(controller).code().network
+    return _parts(controller)[0].circuit.network
 
 
-def _coded(controller: Controller) -> Coded:
-    if not isinstance(controller, Coded):
+def _parts(controller: Controller) -> tuple[CircuitController, SteeringCode]:
+    """The circuit of a controller, and its turning as C."""
+    steering, inner = SteeringCode(), controller
+    if isinstance(controller, TurningController):
+        steering, inner = controller.between.code(), controller.inner
+    if not isinstance(inner, CircuitController):
         raise ConfigError(
             f"{getattr(controller, 'name', type(controller).__name__)} cannot be exported: only controllers that step "
-            "a network can (sns, adaptive, sns-pressure, sns-waiting, sns-robust, NetworkController)"
+            "a network can (sns, adaptive, sns-pressure, sns-waiting, sns-robust, and every other circuit)"
         )
-    return controller
+    return inner, steering
 
 
-def _controller_vectors(controller: Coded, code: ControllerCode) -> Vectors:
-    rng, n, vectors = np.random.default_rng(0), code.n_segments, Vectors()
-    timestep_s = code.stepper.timestep_ms / 1e3
+def _controller_vectors(controller: Controller, circuit: CircuitController, senses: tuple[str, ...]) -> Vectors:
+    rng, n, vectors = np.random.default_rng(0), circuit.n_segments, Vectors()
+    timestep_s, n_muscles = circuit.timestep_s, n * circuit.muscles_per_segment
     for block in range(N_BLOCKS):
         angle = rng.uniform(-np.pi, np.pi)
         sensation = Sensation(
             time_s=0.0,
             stretch_m=np.where(rng.random((n, 1)) < 0.4, 0.0, rng.uniform(0.0, 0.08, (n, 1))),
             rest_stretch_m=np.zeros((n, 1)),
-            ring_length_m=np.zeros(code.n_muscles),
-            muscle_force_N=np.zeros(code.n_muscles),
+            ring_length_m=np.zeros(n_muscles),
+            muscle_force_N=np.zeros(n_muscles),
             contact_force_N=np.zeros((n, 3)),
             center_of_mass_m=np.zeros(3),
             touch_N=rng.uniform(0.0, 8.0, (n, 4)),
@@ -126,6 +130,6 @@ def _controller_vectors(controller: Coded, code: ControllerCode) -> Vectors:
         potentials, activations = [], []
         for step in range(block * STEPS, (block + 1) * STEPS):
             activations.append(controller.step(replace(sensation, time_s=step * timestep_s)))
-            potentials.append(code.network_state.potential[0].copy())
-        vectors.add({name: SENSED[name].read(sensation) for name in code.senses}, potentials, activations)
+            potentials.append(circuit.potential_mV.copy())
+        vectors.add({name: SENSED[name].read(sensation) for name in senses}, potentials, activations)
     return vectors

@@ -183,7 +183,7 @@ class Interface:
     """What passes between a body and a controller, the same on both sides.
 
     Attributes:
-        senses: What the controller is given, names in `annelid.control.base.SENSED`, in the order in the frame.
+        senses: What the controller is given, names in `annelid.control.SENSED`, in the order in the frame.
         n_segments: Segments.
         n_muscles: Muscles.
         timestep_us: Control step, microseconds.

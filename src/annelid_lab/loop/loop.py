@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from annelid.clock import SLACK_S
 from annelid.config import RunConfig
-from annelid.control import Coded, lengthening_m
+from annelid.control import lengthening_m
 from annelid.errors import ConfigError, SimulationStopped, require_at_least, require_positive
 from annelid.protocols import Controller, Plant, Sensation
 from annelid.simulation import ProgressCallback, Run, build_controller, build_plant, locks, open_run, simulate
@@ -70,7 +70,7 @@ def drive(
         limits: On what is sent to a robot.
         wiring: Of a robot of servos.
         controller: Instead of the configured one, as in `annelid.simulate`; not beside firmware.
-        senses: What a robot senses, names in `annelid.control.base.SENSED`; None for what the controller is given.
+        senses: What a robot senses, names in `annelid.control.SENSED`; None for what the controller is given.
         progress: As in `annelid.simulate`.
         overwrite: Allow a folder that is not empty.
         clock: Time that never goes back, s.
@@ -130,6 +130,6 @@ def drive(
 def _interface(config: RunConfig, body: Plant, senses: Sequence[str] | None) -> Interface:
     if senses is None:
         configured = build_controller(config.model_copy(update={"trial": None}), body)
-        senses = configured.code().senses if isinstance(configured, Coded) else ("lengthening_m",)
+        senses = getattr(configured, "senses", ("lengthening_m",))
     timestep_us = round(1e6 * config.clock.control_timestep_s)
     return Interface(tuple(senses), body.n_segments, body.n_muscles, timestep_us)

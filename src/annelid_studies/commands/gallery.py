@@ -233,17 +233,10 @@ def _tuning(job: Job) -> Path:
 
 
 def _uncertainty(job: Job) -> Path:
-    from annelid.draw import Panel, uncertainty_figure
+    from annelid.draw import uncertainty_figure
 
-    def panel(title: str, start: str, scale: float) -> Panel:
-        own = [row for row in _rows(job) if row["quantity"].startswith(start)]
-        numbers = {kind: [scale * float(row[kind] or nan) for row in own] for kind in ("value", *kinds)}
-        ticks = [row["quantity"].partition(".")[2] for row in own]
-        return Panel(title, ticks, numbers["value"], {name: numbers[kind] for kind, name in kinds.items()})
-
-    kinds = {"parameters": "parameters", "time_step": "time step", "elements": "elements"}
-    elongation = panel("elongation of each segment, mean of its sensors (cm)", "elongation_mean_max_m.", 100.0)
-    return uncertainty_figure([elongation, panel("period (s)", "period_s", 1.0)], job.stem.with_suffix(".png"))
+    rows = {row["quantity"]: {name: value or nan for name, value in row.items()} for row in _rows(job)}
+    return uncertainty_figure(rows, job.stem.with_suffix(".png"))
 
 
 def makers() -> Mapping[str, Callable[[Job], Path]]:

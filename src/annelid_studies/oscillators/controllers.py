@@ -153,7 +153,7 @@ class HeteroclinicController(SegmentController):
         """Returns to node 1: segment 1 contracted, all others at rest."""
         self._now = {
             "activity": self._stepper.initial_state(),
-            "cue": np.zeros(self._n_segments),
+            "cue": np.zeros(self.n_segments),
             "seed": np.array(seed, dtype=np.uint64),
             "n_steps": np.array(0),
         }
@@ -169,7 +169,7 @@ class HeteroclinicController(SegmentController):
             kick = config.noise * np.random.Generator(place).standard_normal(now["activity"].shape)
         now["activity"] = self._stepper.advance(now["activity"], pushed, kick)
         now["n_steps"] += 1
-        return np.minimum(now["activity"][0], 1.0).repeat(self._muscles_per_segment)
+        return np.minimum(now["activity"][0], 1.0).repeat(self.muscles_per_segment)
 
     def _cues(self, sensation: Sensation) -> Array:
         if self._config.feedback == "stretch":
@@ -178,13 +178,13 @@ class HeteroclinicController(SegmentController):
         if self._config.feedback == "contact":
             load = np.linalg.norm(sensation.contact_force_N, axis=1)
             return np.roll(load >= self._config.contact_cue_N, 1).astype(float)
-        return np.zeros(self._n_segments)
+        return np.zeros(self.n_segments)
 
     def _values(self) -> Values:
         return {"node_activity": self._now["activity"][0].copy(), "cue_on": self._now["cue"].copy()}
 
     def _coords(self) -> dict[str, list[int] | list[str]]:
-        return {"segment": list(range(1, self._n_segments + 1))}
+        return {"segment": list(range(1, self.n_segments + 1))}
 
     def _attrs(self) -> dict[str, float | int | str]:
         return {"leaving_rate_per_s": self._stepper.ring.leaving_rate_per_s}
@@ -227,7 +227,7 @@ class PhaseChainController(SegmentController):
     def reset(self, seed: int) -> None:
         """Returns to the initial wave; nothing here is random."""
         limbs = [0.0, np.pi] if self._config.limbs else []
-        phase = np.append(-self._lag * np.arange(self._n_segments), limbs)
+        phase = np.append(-self._lag * np.arange(self.n_segments), limbs)
         self._now = vars(self._stepper.initial_state(self._drive(0), phase)) | {"n_steps": np.array(0)}
 
     def step(self, sensation: Sensation) -> Array:
@@ -237,9 +237,9 @@ class PhaseChainController(SegmentController):
         state = self._stepper.advance(state, self._drive(int(now["n_steps"])))
         now |= vars(state)
         now["n_steps"] += 1
-        output = self._stepper.output(state)[0, : self._n_segments]
+        output = self._stepper.output(state)[0, : self.n_segments]
         most = 2.0 * float(BODY.amplitude(BODY.highest_drive))
-        return np.clip(output / most, 0.0, 1.0).repeat(self._muscles_per_segment)
+        return np.clip(output / most, 0.0, 1.0).repeat(self.muscles_per_segment)
 
     def _drive(self, n_steps: int) -> float:
         drive = self._config.drive + self._config.drive_slope_per_s * n_steps * self._timestep_s
@@ -254,4 +254,4 @@ class PhaseChainController(SegmentController):
 
     def _coords(self) -> dict[str, list[int] | list[str]]:
         limbs = ["fore_limb", "hind_limb"] if self._config.limbs else []
-        return {"oscillator": [f"body_{segment}" for segment in range(1, self._n_segments + 1)] + limbs}
+        return {"oscillator": [f"body_{segment}" for segment in range(1, self.n_segments + 1)] + limbs}

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from wire_line import INTERFACE, Body, robot
 
 import annelid
-from annelid.control.base import SENSED
+from annelid.control import SENSED
 from annelid.errors import ConfigError
 from annelid_lab.firmware import Firmware, controller_firmware
 from annelid_lab.firmware.host import OPTIONS

@@ -1,14 +1,12 @@
 """The network on the planar worm: the published periods and the order of contraction."""
 
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
 
-from annelid.config import Clock
-from annelid.config.settings import StretchSensor as SensorSection
-from annelid.control import SnsController
-from annelid.control.sns import Sns
+from annelid.config import Clock, load_config
 from annelid.nervous import Scheme
 from annelid.protocols import Sensation
 from annelid_studies.planar import Riddle2022Plant
@@ -21,13 +19,9 @@ def contraction_times_ms(n, tau_ms, gain, duration_s, scheme: Scheme = "euler", 
     """Times at which each segment's contraction neuron overtakes its expansion neuron, between samples."""
     clock = Clock(control_timestep_s=TIMESTEP_S, physics_timestep_s=TIMESTEP_S)
     plant = Riddle2022Plant(PlanarBody(n_segments=n, gain=gain), clock)
-    controller = SnsController(
-        Sns(gate_time_constant_ms=tau_ms, activation="linear", scheme=scheme),
-        SensorSection(tolerance_m=0.0001),
-        n,
-        n,
-        TIMESTEP_S,
-    )
+    section = {"kind": "sns", "gate_time_constant_ms": tau_ms, "activation": "linear", "scheme": scheme}
+    config = load_config({"controller": section, "sensor": {"tolerance_m": 0.0001}})
+    controller: Any = config.controller.build(config, plant)
     felt: Sensation = plant.reset(0)
     controller.reset(0)
     if start is not None:

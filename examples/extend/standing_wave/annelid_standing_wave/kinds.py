@@ -40,5 +40,5 @@ class StandingWaveController(OpenLoopController[StandingWave]):
 
     def activation(self, time_s: float) -> NDArray[np.float64]:
         """Returns the activation of every segment at a time."""
-        sides = np.where(np.arange(self._n_segments) % 2 == 0, 1.0, -1.0)
-        return 0.5 * (1.0 + sides * np.cos(2.0 * np.pi * time_s / self._pattern.period_s))
+        sides = np.where(np.arange(self.n_segments) % 2 == 0, 1.0, -1.0)
+        return 0.5 * (1.0 + sides * np.cos(2.0 * np.pi * time_s / self.pattern.period_s))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from annelid.draw.canvas import canvas, draw_lines, panel_title, save, save_both, segment_colors
+from annelid.protocols import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,6 +19,12 @@ _MM = 1e3
 _DOT, _BEST, _START, _ = segment_colors(4)
 _WIDTHS_PT = (9.0, 5.0, 2.0)
 _LEAST_SHARE = 0.02
+_UNCERTAIN = {
+    "elongation of each segment, mean of its sensors (cm)": ("elongation_mean_max_m.", 100.0),
+    "period (s)": ("period_s", 1.0),
+}
+"""Panels of error bars: how the names of their quantities begin, and what a value is multiplied by."""
+_NESTED = ("parameters", "time_step", "elements")
 
 
 def load_frame_figure(loops: Mapping[str, tuple[ArrayLike, ArrayLike]], stem: str | Path) -> Path:
@@ -99,50 +105,47 @@ def pareto_figure(
         return save_both(figure, stem)
 
 
-@dataclass(frozen=True, slots=True)
-class Panel:
-    """One panel of values side by side, ``(k,)``; None where there is none or where an error is not known."""
-
-    title: str  # what they are, with their unit
-    ticks: Sequence[str]  # the segment of each, empty if it is of the whole worm
-    values: Sequence[float | None]
-    errors: Mapping[str, Sequence[float | None]]  # by kind, innermost first, at most three
-
-
-def uncertainty_figure(panels: Sequence[Panel], path: str | Path) -> Path:
-    """Draws panels side by side, as wide as they have values.
+def uncertainty_figure(rows: Mapping[str, Mapping[str, Any]], path: str | Path) -> Path:
+    """Draws elongations and period with their error bars side by side.
 
     The bars of a value are nested: each ends at the root of the sum of the squares of its own error and of those inside
     of it, so the outermost end is the total.
 
     Args:
-        panels: The panels.
-        path: Path of the files without a suffix.
+        rows: Values and errors by quantity, as ``uncertainty.csv`` has them; None for what is not known.
+        path: Path of the file.
     """
+    panels = {title: [name for name in rows if name.startswith(start)] for title, (start, _) in _UNCERTAIN.items()}
     with canvas(3.4) as figure:
-        widths = [1.0 + len(panel.values) for panel in panels]
+        widths = [1.0 + len(names) for names in panels.values()]
         row = figure.subplots(1, len(panels), width_ratios=widths, squeeze=False)[0]
-        for axes, panel in zip(row, panels, strict=True):
-            _draw(axes, panel)
+        for axes, (title, names) in zip(row, panels.items(), strict=True):
+            factor = _UNCERTAIN[title][1]
+            columns = {
+                column: factor * np.array([rows[name][column] for name in names], dtype=float)
+                for column in ("value", *_NESTED)
+            }
+            _draw_nested(axes, columns.pop("value"), columns)
+            panel_title(axes, title)
+            segments = [name.partition(".")[2] for name in names]
+            axes.set_xticks(range(len(names)), [f"segment {one}" if one else "" for one in segments])
         handles, labels = row[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
         return save(figure, path)
 
 
-def _draw(axes: Axes, panel: Panel) -> None:
-    places = np.arange(len(panel.values))
-    values = np.array(panel.values, dtype=float)
+def _draw_nested(axes: Axes, values: Array, errors: Mapping[str, Array]) -> None:
+    """Draws values, ``(k,)``, and their errors by kind, the innermost first; NaN for what is not known."""
+    places = np.arange(len(values))
     square, below = np.zeros(len(values)), np.zeros(len(values))
     styles = zip(_WIDTHS_PT, segment_colors(len(_WIDTHS_PT)), strict=True)
-    for (kind, errors), (width, color) in zip(panel.errors.items(), styles, strict=False):
-        square += np.nan_to_num(np.array(errors, dtype=float)) ** 2
+    for (kind, error), (width, color) in zip(errors.items(), styles, strict=True):
+        square += np.nan_to_num(error) ** 2
         end = np.sqrt(square)
         axes.vlines(places, values - end, values - below, color=color, linewidth=width)
-        axes.vlines(places, values + below, values + end, color=color, linewidth=width, label=kind)
+        axes.vlines(places, values + below, values + end, color=color, linewidth=width, label=kind.replace("_", " "))
         below = end
     axes.plot(places, values, "_", color="0.1", markersize=16.0, markeredgewidth=1.6, label="this run")
-    panel_title(axes, panel.title)
-    axes.set_xticks(places, [f"segment {tick}" if tick else "" for tick in panel.ticks])
     axes.set_xlim(-0.6, len(values) - 0.4)
     axes.grid(axis="x", visible=False)
     # Differences far below the values stay small.

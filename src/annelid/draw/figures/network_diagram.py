@@ -41,7 +41,6 @@ _GREY, _ARROW = "#595959", "#4d4d4d"
 _LOOKS: dict[Effect, tuple[str, Any, int, bool, Any]] = {
     "excitatory": ("#c2410c", "-", 3, False, ">"),
     "inhibitory": ("#1b2a6b", "-", 40, True, "o"),
-    "modulatory": (_GREY, "--", 4, False, "D"),
     "gap junction": (_GREY, (0, (1, 1)), 0, False, None),
     "rectified gap junction": (_GREY, (0, (1, 1)), 3, True, ">"),
 }
@@ -340,19 +339,17 @@ def _draw_ends(axes: Axes, network: Network, places: dict[str, complex], routes:
 
 
 def _draw_neurons(axes: Axes, network: Network, places: dict[str, complex], unit_in: float) -> None:
-    """Draws circles, or octagons for neurons that spike, with a double rim for gated channels, and their labels."""
-    from matplotlib.patches import Circle, RegularPolygon
+    """Draws circles, with a double rim for gated channels, and their labels."""
+    from matplotlib.patches import Circle
 
     labels = labels_of(network)
     for number, (name, place) in enumerate(places.items()):
         neuron, center = network.neurons[name], (place.real, place.imag)
         radii = (_RADIUS, 0.84 * _RADIUS) if neuron.channels else (_RADIUS,)
         for radius, width, face in zip(radii, (1.3, 0.8), ("white", "none"), strict=False):
-            spiking = neuron.firing is not None
-            rim = RegularPolygon(center, 8, radius=radius, orientation=np.pi / 8) if spiking else Circle(center, radius)
-            rim.set(facecolor=face, edgecolor="black", linewidth=width, zorder=4)
-            rim.set_gid(f"neuron-{number}" if radius == _RADIUS else None)
-            axes.add_patch(rim)
+            gid = f"neuron-{number}" if radius == _RADIUS else None
+            look = {"facecolor": face, "edgecolor": "black", "linewidth": width, "zorder": 4, "gid": gid}
+            axes.add_patch(Circle(center, radius, **look))
         size = min(9.0, 1.5 * _RADIUS * unit_in * 72.0 / (0.6 * max(len(labels[name]), 1)))
         axes.text(*center, plain(labels[name]), ha="center", va="center_baseline", fontsize=size, zorder=5)
 
@@ -371,8 +368,6 @@ def _draw_key(figure: Figure, network: Network) -> None:
     entries = [Line2D([], [], marker="o", label="neuron", **ring)]
     if any(neuron.channels for neuron in neurons):
         entries.append(Line2D([], [], marker="$\u25ce$", label="neuron with gated channels", **ring))
-    if any(neuron.firing is not None for neuron in neurons):
-        entries.append(Line2D([], [], marker="8", label="spiking neuron", **ring))
     found = {effect_of(network, link) for link in network.connections}
     for effect, (color, dashes, _, filled, marker) in _LOOKS.items():
         if effect in found:

@@ -16,7 +16,8 @@ import mujoco
 import numpy as np
 
 from annelid.arena.surface import Shape
-from annelid.config.run import ArenaKind, Walls
+from annelid.config.answers import Walls
+from annelid.config.run import ArenaKind
 from annelid.errors import ConfigError, shortened
 from annelid.morphology import Array, MeshGeometry
 

@@ -20,7 +20,7 @@ from annelid.body.estimates import (
     weakness_findings,
 )
 from annelid.body.mesh import MeshBody
-from annelid.config.run import Finding
+from annelid.config.answers import Finding
 from annelid.config.sections import Positive
 from annelid.morphology import Array
 

@@ -66,7 +66,8 @@ def weakness_findings(body: MeshBody, field: str, value: float, force_N: float) 
     """Checks the greatest force of an actuator against what hardly closes a ring."""
     needed = bearable_force_N(body, 1.0 - LEAST_SHORTENED)
     if force_N < needed / ESTIMATE_FACTOR:
-        problem = f"a ring is pulled with {force_N:.2g} N at most, where {needed:.2g} N shorten it by {100 * LEAST_SHORTENED:g} %"
+        share = 100 * LEAST_SHORTENED
+        problem = f"a ring is pulled with {force_N:.2g} N at most, where {needed:.2g} N shorten it by {share:g} %"
         instead = f"set at least {ESTIMATE_FACTOR * value * needed / force_N:.2g}" if force_N else "set more"
         yield Finding(f"body.rings.{field}", value, problem, instead)
 

@@ -24,7 +24,7 @@ ACTIVATED = 0.1
 LEAST_CONTRACTION_S = 0.2
 """Contractions shorter than this may be over before a cable is taut."""
 LONG_CONTRACTION_S = 0.5
-"""In a contraction as long as this, the slowest of the robots' cables shortens its ring by more than `LEAST_SHORTENED`."""
+"""In a contraction as long as this, the slowest of the robots' cables shortens a ring by over `LEAST_SHORTENED`."""
 LONG = 3.0
 """Length of an axial spring, over that at rest, from which a run is doubtful."""
 MOST_STRETCH = 1.1

@@ -22,7 +22,7 @@ from annelid.errors import ConfigError
 from annelid.experiment import Case, Judged, Store, finer_steps, judge, more_elements
 from annelid.markdown import Table
 from annelid.output import write_csv
-from annelid_studies.tables import grouped, terminal_table
+from annelid_studies.tables import Results, grouped, terminal_table
 from annelid_studies.worms import Effort, drawn_frictions
 
 GAITS = ("riddle2025-muscles", "crawler")
@@ -127,6 +127,14 @@ def crawl(store: Store, gaits: Sequence[str], effort: Effort) -> list[Reading]:
     cases = runs(gaits, effort)
     store.compute(cases.values(), "crawling")
     return [Reading(*point, judge(store[case])) for point, case in cases.items()]
+
+
+def speed(store: Store, output: Path, effort: Effort, gaits: Sequence[str] | None = None) -> Results:
+    """The study `speed`, of `GAITS` or others."""
+    readings = crawl(store, gaits or GAITS, effort)
+    path = write_readings(readings, output / "speed.csv")
+    tables = [crawling_table(readings, quantity) for quantity in VALUES]
+    return (path, write_figure(readings, path.with_suffix(""))), tables
 
 
 def write_readings(readings: Sequence[Reading], path: Path) -> Path:
@@ -239,6 +247,16 @@ def headlines(store: Store, gaits: Sequence[str], effort: Effort) -> Iterator[He
         own, *others = (judge(store[case]) for case in cases)
         found = dict(zip(finer, others[len(perturbed) :], strict=True))
         yield Headline(gait, own, others[: len(perturbed)], found)
+
+
+def gaits(store: Store, output: Path, effort: Effort, gaits: Sequence[str] | None = None) -> Results:
+    """The study `gaits`, of `HEADLINES` or others; the file is written gait by gait."""
+    found: list[Headline] = []
+    path = output / "gaits.csv"
+    for one in headlines(store, gaits or HEADLINES, effort):
+        found.append(one)
+        write_headlines(found, path)
+    return (path,), [headline_table(found)]
 
 
 def write_headlines(found: Sequence[Headline], path: Path) -> Path:

@@ -17,7 +17,8 @@ from annelid.draw import canvas, draw_lines, line_looks, panel_title, save_both
 from annelid.experiment import Case, Store
 from annelid.morphology import Array
 from annelid.simulation import Run
-from annelid_studies.tables import grouped, tabulated, terminal_table
+from annelid_studies.tables import Results, grouped, tabulated, terminal_table, write_fields
+from annelid_studies.worms import Effort
 
 PRESET = "riddle2025-muscles"
 CM = 100.0
@@ -156,6 +157,13 @@ def _course(run: Run, passage: Passage) -> Course:
     smooth = np.array([drive[np.abs(time - now) <= WINDOW_S / 2].mean() for now in passage.time_s])
     first_ring = np.interp(passage.time_s, time, rings[:, 0])
     return Course(passage.front_m, passage.bore_m[:, 0], passage.speed_over_m_per_s(WINDOW_S), smooth, first_ring)
+
+
+def study(store: Store, output: Path, effort: Effort) -> Results:
+    """The study `pipes`."""
+    readings, courses = pass_pipes(store, trials(effort == "quick"))
+    path = write_fields(Reading, readings, output / "pipes.csv")
+    return (path, pipes_picture(readings, courses, path.with_suffix(""))), [pipes_table(readings)]
 
 
 def pipes_table(readings: Sequence[Reading]) -> TerminalTable:

@@ -22,7 +22,8 @@ from annelid.draw import canvas, line_looks, panel_title, save_both
 from annelid.experiment import Case, Store
 from annelid.morphology import Array
 from annelid.simulation import Run
-from annelid_studies.tables import grouped, tabulated, terminal_table
+from annelid_studies.tables import Results, grouped, tabulated, terminal_table, write_fields
+from annelid_studies.worms import Effort
 
 CM = 100.0
 Ground = Literal["flat", "straight pipe", "bend"]
@@ -209,6 +210,13 @@ def compare(store: Store, wanted: Sequence[Point]) -> list[Reading]:
         counts = sum(out), sum(passed), min(ways)
         readings.append(Reading(*point, len(own), *mean, *counts, in_figure(point), own[0].command))
     return readings
+
+
+def study(store: Store, output: Path, effort: Effort) -> Results:
+    """The study `riddle2025`."""
+    readings = compare(store, points(effort == "quick"))
+    path = write_fields(Reading, readings, output / "riddle2025.csv")
+    return (path, comparison_picture(readings, path.with_suffix(""))), [comparison_table(readings)]
 
 
 def comparison_table(readings: Sequence[Reading]) -> TerminalTable:

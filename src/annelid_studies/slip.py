@@ -24,7 +24,7 @@ from annelid.markdown import Table
 from annelid.output import write_csv
 from annelid.simulation import Run
 from annelid_studies.slip_detector import Detection, DetectionScore, detect_slip, precision_recall, score_detections
-from annelid_studies.tables import terminal_table
+from annelid_studies.tables import Results, terminal_table
 from annelid_studies.worms import Effort, drawn_frictions
 
 PRESET = "riddle2025-muscles"
@@ -100,6 +100,13 @@ def slip_feedback(store: Store, effort: Effort, *, half_step: bool = False) -> l
         in_order = sum(store[one].rhythm.is_one_wave for one in own)
         readings.append(Reading(*at, in_order, len(own), *(mean_and_interval(each.tolist()) for each in estimates)))
     return readings
+
+
+def feedback(store: Store, output: Path, effort: Effort, half_step: bool = False) -> Results:
+    """The study `slip`."""
+    readings = slip_feedback(store, effort, half_step=half_step)
+    path = write_readings(readings, output / "slip.csv")
+    return (path, feedback_figure(readings, path.with_suffix(""))), [feedback_table(readings)]
 
 
 def speed_and_loss(run: Run) -> tuple[float, float]:
@@ -188,6 +195,14 @@ def slip_detection(store: Store, names: Sequence[str] = tuple(CASES)) -> dict[st
     """
     store.compute([CASES[name] for name in names], "detector")
     return {name: detect_slip(store.run(CASES[name])) for name in names}
+
+
+def detection(store: Store, output: Path, effort: Effort) -> Results:
+    """The study `slip-detector`."""
+    found = slip_detection(store, QUICK_CASES if effort == "quick" else tuple(CASES))
+    scored = scores(found)
+    path = write_scores(scored, output / "slip_detector.csv")
+    return (path, detector_figure(found, path.with_suffix(""))), [detection_table(scored)]
 
 
 def scores(detections: Mapping[str, Detection]) -> dict[str, DetectionScore]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import astuple
 from pathlib import Path
 from typing import Any, TypeVar
@@ -14,6 +14,8 @@ from annelid.output import write_csv
 
 T = TypeVar("T")
 K = TypeVar("K")
+Results = tuple[Sequence[Path], Sequence[TerminalTable]]
+"""What a study leaves: the files that it has written, and tables for the terminal."""
 
 
 def grouped(items: Iterable[T], key: Callable[[T], K]) -> dict[K, list[T]]:
@@ -27,6 +29,11 @@ def grouped(items: Iterable[T], key: Callable[[T], K]) -> dict[K, list[T]]:
 def tabulated(rows: Iterable[T], columns: Mapping[str, Callable[[T], str]]) -> Table:
     """Makes a table of things, one a row, from what each column writes of a row, by its head."""
     return Table(list(columns), [[cell(row) for cell in columns.values()] for row in rows])
+
+
+def records(table: Table) -> list[dict[str, str]]:
+    """Returns the rows of a table, each by its heads, for JSON."""
+    return [dict(zip(table.header, row, strict=True)) for row in table.rows]
 
 
 def terminal_table(table: Table, title: str, *, n_words: int = 1, caption: str = "") -> TerminalTable:

@@ -15,7 +15,8 @@ from annelid.analysis import Track, track_of
 from annelid.draw import canvas, draw_lines, line_looks, panel_title, save_both
 from annelid.errors import RunFileError
 from annelid.experiment import Case, Store
-from annelid_studies.tables import grouped, tabulated, terminal_table
+from annelid_studies.tables import Results, grouped, tabulated, terminal_table, write_fields
+from annelid_studies.worms import Effort
 
 COUNTER = (1.0, 1.0, -1.0, -1.0, 1.0, 1.0)
 """Shares of six segments: the ends bend to one side, the middle to the other."""
@@ -155,6 +156,13 @@ def turning(
         )
         tracks.append(track)
     return readings, tracks
+
+
+def study(store: Store, output: Path, effort: Effort) -> Results:
+    """The study `turning`."""
+    readings, tracks = turning(store, QUICK if effort == "quick" else MODULATIONS)
+    path = write_fields(Reading, readings, output / "turning.csv")
+    return (path, turning_picture(readings, tracks, path.with_suffix(""))), [turning_table(readings)]
 
 
 def turning_table(readings: Sequence[Reading]) -> TerminalTable:

@@ -61,6 +61,7 @@ def paper_command(
     from annelid.output import with_suffix, write_text
     from annelid_studies.riddle2023.paper import reproduce
     from annelid_studies.riddle2023.report import claims_page, write_report
+    from annelid_studies.tables import records
 
     if claims is not None:
         if only:
@@ -75,9 +76,11 @@ def paper_command(
     written = [html, html.with_suffix(".md")]
     if claims is not None:
         written.append(write_text(claims, claims_page(report)))
-    numbers = [dict(zip(report.main_table.header, row, strict=True)) for row in report.main_table.rows]
-    examined = {each.examination.name: dict(each.findings.numbers) for each in report.examinations}
-    found = {"numbers": numbers, "claims": [asdict(claim) for claim in report.claims], "examinations": examined}
+    found = {
+        "numbers": records(report.main_table),
+        "claims": [asdict(claim) for claim in report.claims],
+        "examinations": {one.examination.name: records(one.findings.table) for one in report.examinations},
+    }
     print_results(written, quiet=quiet, results=found)
 
 

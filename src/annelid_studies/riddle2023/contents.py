@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import isfinite
 from pathlib import Path
@@ -12,6 +12,7 @@ from typing import Any, Literal, get_args
 from annelid.errors import suggest
 from annelid.experiment import Case, Store
 from annelid.markdown import Table
+from annelid_studies.riddle2023.words import filled, texts
 from annelid_studies.worms import Effort
 
 Verdict = Literal["holds", "holds within", "rests on", "does not hold", "not testable here"]
@@ -20,15 +21,15 @@ Number = float | str | None
 
 @dataclass(frozen=True)
 class Claim:
-    """One claim of the paper and what became of it."""
+    """One claim of the paper and what became of it; ``claims/claims.toml`` explains the words."""
 
-    topic: str  # Structure, sensing, actuation, results, discussion, future work
-    claim: str  # What the paper says, in our words
-    place: str  # Where it says so
-    paper: str  # The paper's number or words
-    ours: str  # Our number or words
-    evidence: str  # Why we say so, in one to three sentences; for a claim that fails, its cause as far as we found it
-    command: str  # The command that makes our number
+    topic: str
+    claim: str
+    place: str
+    paper: str
+    ours: str
+    evidence: str
+    command: str
     verdict: Verdict  # Whether it holds
     within: str = ""  # How nearly, for example "4.5 %", where it holds within something; what it rests on
 
@@ -58,13 +59,13 @@ class Numbers(dict[str, Number]):
 
 @dataclass(frozen=True)
 class Findings:
-    """What an examination found."""
+    """What an examination found; ``examinations/examinations.toml`` explains the words."""
 
-    answer: str  # The answer to its question in one to four sentences, with numbers; shown in bold at its top
-    caption: str  # What one sees in the figure
-    table: Table  # The numbers
-    remarks: Sequence[str] = ()  # Paragraphs for those who want to know more; may be empty
-    # Single results by name, for the claims; NaN and infinities become None, since JSON lacks them
+    answer: str
+    caption: str
+    table: Table
+    remarks: Sequence[str] = ()
+    # Single results that claims are judged by; NaN and infinities become None, since JSON lacks them
     numbers: Mapping[str, Number] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -80,11 +81,43 @@ class Examination:
     """A small reproducible study."""
 
     name: str  # One word, for file names and ``annelid paper --only``
-    title: str  # Its heading
-    question: str  # What it asks, in one or two sentences
+    title: str
+    question: str
     cases: Callable[[Effort], Sequence[Case]]  # The runs that it needs at an effort
     # Draws its figure as ``<stem>.svg`` and ``<stem>.png`` and returns what it found in a store of its runs
     examine: Callable[[Store, Effort, Path], Findings]
+
+
+EXAMINATIONS_TOML = "examinations/examinations.toml"
+
+
+def examination(
+    name: str, cases: Callable[[Effort], Sequence[Case]], examine: Callable[[Store, Effort, Path], Findings]
+) -> Examination:
+    """Makes an examination whose words stand in ``examinations.toml``."""
+    words = texts(EXAMINATIONS_TOML)[name]
+    return Examination(name, filled(words["title"], {}), filled(words["question"], {}), cases, examine)
+
+
+def findings(
+    name: str,
+    values: Mapping[str, Any],
+    table: Table,
+    remarks: Iterable[str] = (),
+    numbers: Mapping[str, Number] | None = None,
+) -> Findings:
+    """Says what an examination found.
+
+    Args:
+        name: Its name in ``examinations.toml``.
+        values: What fills its words.
+        table: Its table.
+        remarks: Names of the remarks that apply.
+        numbers: Single results that claims are judged by.
+    """
+    words = texts(EXAMINATIONS_TOML)[name]
+    answer, caption = (filled(words[part], values) for part in ("answer", "caption"))
+    return Findings(answer, caption, table, [filled(words["remarks"][one], values) for one in remarks], numbers or {})
 
 
 @dataclass(frozen=True)

@@ -25,11 +25,11 @@ from annelid.textfiles import read_json
 from annelid_studies.riddle2023 import words
 from annelid_studies.riddle2023.claims import Evidence, claim_cases, paper_claims, rule
 from annelid_studies.riddle2023.claims.evidence import order_of, readings_m
-from annelid_studies.riddle2023.contents import Claim, Examined, Figure, Findings, Report
+from annelid_studies.riddle2023.contents import EXAMINATIONS_TOML, Claim, Examined, Figure, Findings, Report
 from annelid_studies.riddle2023.examinations import EXAMINATIONS
 from annelid_studies.riddle2023.examinations.design import walked_elongation
 from annelid_studies.riddle2023.figures import muscle_surface, planar_models, propagation, renderings, robot_lengths
-from annelid_studies.riddle2023.words import CM, MM, PERCENT
+from annelid_studies.riddle2023.words import CM, MM, PERCENT, texts
 from annelid_studies.worms import CHAIN, FAST, RODS, RODS_STEP_S, Effort, rods
 
 MAIN = Case(CHAIN)
@@ -98,7 +98,8 @@ def reproduce(
         report_drawing()
         stem = pictures / asked.name
         runs = sorted({store.path(case).name for case in asked.cases(effort)})
-        found = kept(stem, [effort, runs], lambda asked=asked, stem=stem: asdict(asked.examine(store, effort, stem)))
+        made_of = [effort, runs, texts(EXAMINATIONS_TOML).get(asked.name)]
+        found = kept(stem, made_of, lambda asked=asked, stem=stem: asdict(asked.examine(store, effort, stem)))
         findings = Findings(**{**found, "table": Table(**found["table"])})
         examined.append(Examined(asked, findings, stem.with_suffix(".png")))
     main, claims, judging = store.run(MAIN), list[Claim](), list[str]()

@@ -1,15 +1,19 @@
-"""Numbers, lists and rhythms in words, as all examinations and claims write them."""
+"""Numbers, lists and rhythms in words, as all examinations and claims write them, and the files of these words."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
+from functools import cache
+from importlib.resources import files
 from math import isfinite, nan
+from string import Formatter
 from typing import Any
 
 import numpy as np
 
 from annelid.analysis import RhythmScore
 from annelid.morphology import Array
+from annelid.textfiles import parse_toml
 
 CM, MM, MS, PERCENT = 100.0, 1000.0, 1000.0, 100.0
 NOTHING = "–"
@@ -101,3 +105,32 @@ def kind(score: RhythmScore) -> str:
     if score.verdict == "ordered":
         return "1-2-3" if score.is_one_wave else "other order"
     return score.verdict or "too short"
+
+
+@cache
+def texts(name: str) -> Mapping[str, Any]:
+    """Reads one of the files of words beside this module, by its path."""
+    return parse_toml((files("annelid_studies.riddle2023") / name).read_text(encoding="utf-8"), name)
+
+
+_UNITS = {"n": 1.0, "cm": CM, "mm": MM, "%": PERCENT}
+
+
+class _Words(Formatter):
+    def format_field(self, value: Any, format_spec: str) -> str:
+        unit, _, digits = format_spec.partition(".")
+        if unit not in _UNITS:
+            return super().format_field(value, format_spec)
+        n_digits = int(digits or {"%": 0}.get(unit, 2))
+        if value is None or np.ndim(value) == 0:
+            return in_unit(value, _UNITS[unit], n_digits)
+        return span(value, _UNITS[unit], n_digits)
+
+
+def filled(text: str, values: Mapping[str, Any]) -> str:
+    """Returns a text of such a file on one line, with values in the place of names in braces.
+
+    Beside Python's formats there are ``n``, ``cm``, ``mm`` and ``%``, of a number in its SI unit and with two digits,
+    ``%`` with none; ``cm.1`` has one. Several numbers become their range, and a missing one a dash.
+    """
+    return _Words().vformat(" ".join(text.split()), (), values)

@@ -13,12 +13,14 @@ from rich.table import Table as TerminalTable
 
 from annelid.analysis import PAPER_ELONGATION_M, ROBOT_ELONGATION_M, interior_deficit
 from annelid.draw import canvas, panel_title, save_both, segment_colors
+from annelid.experiment import Store
 from annelid.markdown import Table
 from annelid.output import write_csv
-from annelid_studies.tables import tabulated, terminal_table
+from annelid_studies.tables import Results, tabulated, terminal_table
 from annelid_studies.weak_middle.pulls import ACTUATORS, Key, Setting
 from annelid_studies.weak_middle.sweeps import (
     BASE,
+    BASE_KEY,
     FRICTION,
     QUANTITIES,
     STIFFNESS,
@@ -27,8 +29,11 @@ from annelid_studies.weak_middle.sweeps import (
     Asymmetry,
     Quantity,
     Reading,
+    asymmetry,
     deficits,
+    weak_middle,
 )
+from annelid_studies.worms import Effort
 
 ROBOT_DEFICIT, PAPERS_DEFICIT = interior_deficit(ROBOT_ELONGATION_M), interior_deficit(PAPER_ELONGATION_M)
 """How far the interior segments of the robot and of the paper's simulation stay below the ends, fractions."""
@@ -159,6 +164,16 @@ def asymmetry_table(found: Asymmetry) -> TerminalTable:
         caption = f"with force limits of {limits} N the segments elongate by {reached} cm; the robot's by {robot} cm"
     title = "what makes an interior segment as weak and as strong as the robot's two"
     return terminal_table(tabulated(found.answers, columns), title, caption=caption)
+
+
+def study(store: Store, output: Path, effort: Effort) -> Results:
+    """The study `weak-middle`; a quick one leaves the robot's own differences out."""
+    set_to, readings = weak_middle(store, effort)
+    found = asymmetry(store, set_to[BASE_KEY].force_N) if effort == "full" else None
+    tables = [settings_table(set_to), *(sweep_table(readings, quantity) for quantity in QUANTITIES)]
+    tables += [checks_table(readings), asymmetry_table(found)] if found else []
+    path = write_readings([*readings, *(found.readings if found else ())], output / "weak_middle.csv")
+    return (path, weak_middle_figure(readings, path.with_suffix(""))), tables
 
 
 def _cell(reading: Reading) -> str:

@@ -1,11 +1,16 @@
-"""What the claims are judged by: one rule, the runs that they need, and every reading of them."""
+"""What the claims are judged by: one rule, the runs that they need, and every reading of them.
+
+The claims themselves are words in ``claims.toml``. A function of a claim's name, marked by `judges`, measures what the
+words leave open and judges it.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import nan
+from typing import Any
 
 import numpy as np
 
@@ -13,8 +18,9 @@ from annelid.experiment import Case, Outcome, Store
 from annelid.morphology import Array
 from annelid.simulation import Run
 from annelid_studies import slip
-from annelid_studies.riddle2023.contents import Findings, Verdict
+from annelid_studies.riddle2023.contents import Claim, Findings, Verdict
 from annelid_studies.riddle2023.examinations.design import WORMS
+from annelid_studies.riddle2023.words import filled, texts
 from annelid_studies.worms import CHAIN, FAST, PLANAR, Effort, chain, fast, one_after_the_other, rods
 
 MAIN = Case(CHAIN)
@@ -42,6 +48,10 @@ EXACT, NEAR = 0.005, 0.1
 TUBE_AREA_M2, POLYETHYLENE_KG_PER_M3 = 1.7e-5, 940.0
 
 
+Judgement = tuple[tuple[Verdict, str], Mapping[str, Any]]
+"""The verdict with what it holds within or rests on, and what fills the claim's words."""
+
+
 @dataclass(frozen=True)
 class Evidence:
     """What the claims are judged by."""
@@ -66,6 +76,26 @@ class Evidence:
         return [(self.store[case], self.store.run(case)) for case in cases]
 
 
+JUDGES: dict[str, Callable[[Evidence], Judgement]] = {}
+"""What judges a claim, by its name in ``claims.toml``."""
+
+
+def judges(function: Callable[[Evidence], Judgement]) -> Callable[[Evidence], Judgement]:
+    """Marks the function that judges the claim of its name."""
+    JUDGES[function.__name__] = function
+    return function
+
+
+def judge(name: str, evidence: Evidence) -> Claim:
+    """Judges one claim of ``claims.toml``."""
+    text = dict(texts("claims/claims.toml")["claims"][name])
+    decided = text.pop("verdict", None), ""
+    verdict, found = JUDGES[name](evidence) if name in JUDGES else (decided, {})
+    commands = {"main": MAIN.command, "planar": PLANAR_CASES[300].command}
+    said = {part: filled(words, {**commands, **found}) for part, words in text.items()}
+    return Claim(**said, verdict=verdict[0], within=verdict[1])
+
+
 def spread_cases(effort: Effort) -> list[Case]:
     """The perturbed runs: of the paper's own worm, or in a quick report fewer, of the one that takes seconds."""
     if effort == "quick":
@@ -76,34 +106,23 @@ def spread_cases(effort: Effort) -> list[Case]:
 def rule(evidence: Evidence) -> list[str]:
     """Says how all claims are judged."""
     perturbed = spread_cases(evidence.effort)
-    n, n_seeds = len(perturbed), sum("seed" in case.changes for case in perturbed)
+    n_seeds = sum("seed" in case.changes for case in perturbed)
     preset = perturbed[0].preset
     swings = [readings_m(evidence.store.run(case)) for case in (Case(preset), *perturbed)]
     periods = [evidence.store[case].rhythm.period_s or nan for case in perturbed]
-    apart = float(np.max(np.ptp(swings, axis=0) / np.mean(swings, axis=0)))
-    spread = (
-        f"Between the {n + 1} runs, {preset} as it is and the {n}, an elongation differs by up to {100 * apart:.1f} % "
-        f"and the period by up to {1e3 * float(np.ptp(periods)):.0f} ms."
-    )
-    which = (
-        "The runs are that worm as it is, and perturbed by less than one could measure on a robot"
-        if evidence.effort == "full"
-        else "In this quick report the run is that worm as it is; a full one adds runs perturbed by less than one "
-        "could measure on a robot"
-    )
-    return [
-        "All claims are judged by one rule. A number of the paper's is compared with every reading of every run of its "
-        "own worm, riddle2023, and a property is looked for in each of them. The readings of an elongation are those "
-        "of the segment's six springs, one a helix, each peak to peak, and the largest mean of the six above rest, "
-        f"since the paper does not say which it read. {which} ({n} runs: friction 1 % lower and higher, and sensor "
-        f"noise of 0.1 mm, {n_seeds} seed{'s' if n_seeds > 1 else ''}). {spread} Where a claim is about other worms or "
-        "settings, its text names what is compared.",
-        f"It holds: all are within {100 * EXACT:g} % of the paper's number, or have the property. It holds within x: "
-        f"all are within {100 * NEAR:g} %, the farthest by x. It rests on something: some are, others are not, and "
-        "they differ in what is named, which need not be the only cause. It does not hold: none is. It "
-        "cannot be tested here: by decision, for the reason given. Geometry, formulae and arithmetic have no "
-        "spread. No time of computing enters a verdict.",
-    ]
+    text = texts("claims/claims.toml")["rule"]
+    found = {
+        "which": filled(text[evidence.effort], {}),
+        "n": len(perturbed),
+        "all_runs": len(perturbed) + 1,
+        "seeds": f"{n_seeds} seed{'s' if n_seeds > 1 else ''}",
+        "preset": preset,
+        "apart": float(np.max(np.ptp(swings, axis=0) / np.mean(swings, axis=0))),
+        "periods_ms": 1e3 * float(np.ptp(periods)),
+        "exact": 100 * EXACT,
+        "near": 100 * NEAR,
+    }
+    return [filled(paragraph, found) for paragraph in text["paragraphs"]]
 
 
 def readings_m(run: Run) -> Array:

@@ -13,7 +13,7 @@ from annelid.draw import canvas, save_both
 from annelid.experiment import Store
 from annelid.morphology import Array
 from annelid_studies.riddle2023 import words
-from annelid_studies.riddle2023.contents import Examination, Findings
+from annelid_studies.riddle2023.contents import Findings, Number, examination, findings
 from annelid_studies.riddle2023.examinations import design
 from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, Columns, Point, Reading, Worm
 from annelid_studies.riddle2023.words import CM, PERCENT
@@ -105,21 +105,7 @@ def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
     walks = [one for one in readings if one.walk]
     _draw(held, walks, stem)
     first = held[0]
-    coarse, fine = (words.span(by_worm[first.worm][i].at_holds("ring_length_m"), CM, digits=1) for i in (0, -1))
-    remarks = [
-        "The differences are root mean squares over the three segments, each read at the end of its own contraction. "
-        f"The rings of {first.worm.label} contract to {coarse} cm with {first.elements[0]} and to {fine} cm with "
-        f"{first.elements[-1]} elements a side. Free ends keep their elements, so that only the sides change. The "
-        "order is fitted with the finest mesh as the reference, whose own error the fit takes into account; it means "
-        "little where the differences do not fall steadily."
-    ]
-    numbers = design.numbered(
-        walks,
-        {
-            "verdict_{worm}_{value:g}": lambda one: words.rhythm(one.rhythm),
-            "period_{worm}_{value:g}_s": lambda one: one.closed.rhythm.period_s,
-        },
-    )
+    numbers: dict[str, Number] = {}
     for found in held:
         for name, apart in found.of_presets.items():
             kind = f"{name.replace(' ', '_')}_{found.worm.name}"
@@ -134,17 +120,20 @@ def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
         "rhythm": lambda one: words.rhythm(one.rhythm) if one.walk else "not run",
         "elongation walking (cm)": lambda one: words.all_in_cm(one.walked_m) if one.walk else "not run",
     }
-    return Findings(
-        answer=" ".join([*map(_convergence_in_words, held), _walks_in_words(walks)]),
-        caption="Left: relative difference of held contractions from the finest mesh over the number of elements a "
-        f"rhombus side ({words.listed(f'{found.worm.label} against {found.elements[-1]}' for found in held)} elements; "
-        f"{words.listed(f'{found.worm.label} {lines[found.worm.line]}' for found in held)}), root mean square over the "
-        f"three segments. Right: largest elongation of each segment of {RIGID.label} in closed loop (mean of its "
-        f"springs), {len(walks)} runs; a cross over a marker: the run does not walk 1-2-3.",
-        table=tabulated(readings, columns),
-        remarks=remarks,
-        numbers=numbers,
-    )
+    said: dict[str, Any] = {
+        "held": " ".join(map(_convergence_in_words, held)),
+        "walk": _walks_in_words(walks),
+        "finest": words.listed(f"{found.worm.label} against {found.elements[-1]}" for found in held),
+        "lines": words.listed(f"{found.worm.label} {lines[found.worm.line]}" for found in held),
+        "rigid": RIGID.label,
+        "n_walks": len(walks),
+        "worm": first.worm.label,
+        "coarse": by_worm[first.worm][0].at_holds("ring_length_m"),
+        "fewest": first.elements[0],
+        "fine": by_worm[first.worm][-1].at_holds("ring_length_m"),
+        "most": first.elements[-1],
+    }
+    return findings("discretization", said, tabulated(readings, columns), ["method"], numbers)
 
 
 def _in_words(differences: Mapping[str, float]) -> str:
@@ -198,11 +187,4 @@ def _draw(held: Sequence[Convergence], walks: Sequence[Reading], stem: Path) -> 
         save_both(figure, stem)
 
 
-DISCRETIZATION = Examination(
-    "discretization",
-    "Elements per rhombus side",
-    "The paper divides each rhombus side into three straight elements. Are held contractions and the walk converged "
-    "there?",
-    lambda effort: design.cases_of(_points(effort)),
-    _examine,
-)
+DISCRETIZATION = examination("discretization", lambda effort: design.cases_of(_points(effort)), _examine)

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from annelid.draw import canvas, save_both
 from annelid.experiment import Case, Store
 from annelid_studies.riddle2023 import words
-from annelid_studies.riddle2023.contents import Examination, Findings
+from annelid_studies.riddle2023.contents import Findings, examination, findings
 from annelid_studies.riddle2023.examinations import design
 from annelid_studies.riddle2023.examinations.design import PAPERS, WORMS, Columns, Point, Reading, Worm
 from annelid_studies.riddle2023.words import CM, MM, PERCENT
@@ -65,31 +67,16 @@ def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
         readings,
         {
             "travel_friction_{value:g}_{worm}_m": lambda one: one.travel_m,
-            "deficit_closed_mean_friction_{value:g}_{worm}": lambda one: one.deficit,
             "verdict_friction_{value:g}_{worm}": lambda one: words.rhythm(one.rhythm),
         },
     )
     numbers |= design.numbered(held, {"deficit_open_mean_friction_{value:g}_{worm}": lambda one: one.held_deficit})
-    numbers["travel_friction_1_m"] = at_papers[0].travel_m
-    numbers |= {f"travel_rods_{MM * step:g}ms_impratio_{ratio:g}_m": travel for (step, ratio), travel in solved.items()}
     orders = []
     for worm, own in design.by_worm(readings).items():
         walk = numbers[f"frictions_that_walk_{worm.name}"] = words.listed(f"{one.value:g}" for one in own if one.walks)
         fail = words.listed(f"{one.value:g} ({words.rhythm(one.rhythm)})" for one in own if not one.walks)
         orders.append(f"{words.capitalised(worm.label)}: order 1-2-3 at friction {walk}, lost at {fail}.")
-    convergence = ""
-    if solved:
-        spread, scale = float(np.ptp(list(solved.values()))), float(np.mean(np.abs(list(solved.values()))))
-        artefact = "no artefact of step or friction cone" if spread < 0.2 * scale else "known to that accuracy only"
-        sizes = [f"{words.in_cm(t)} cm at {MM * dt:g} ms and impratio {ratio:g}" for (dt, ratio), t in solved.items()]
-        convergence = (
-            f"Convergence, rods with rigid crossings at friction {PAPERS_FRICTION:g}: travel {words.listed(sizes)}. "
-            f"The spread is {words.in_cm(spread)} cm, {PERCENT * spread / scale:.0f} % of the mean, so the travel is "
-            f"{artefact}."
-        )
-    small = [one for one in at_papers if abs(one.travel_m) < NEGLIGIBLE_M]
     parts = [rough.held_deficit - smooth.held_deficit for smooth, rough in design.by_worm(held).values()]
-    travels = words.by_worm(at_papers, lambda one: f"{words.in_cm(one.travel_m, 1)} cm")
     slippery = {one.worm: words.in_percent(one.held_deficit) for one in held if one.value == SLIPPERY}
     deficits = words.by_worm(
         (one for one in held if one.value == PAPERS_FRICTION),
@@ -97,6 +84,26 @@ def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
             f"{slippery[one.worm]} % at {SLIPPERY:g} and {words.in_percent(one.held_deficit)} % at {one.value:g}"
         ),
     )
+    found: dict[str, Any] = {
+        "papers_friction": PAPERS_FRICTION,
+        "travels": words.by_worm(at_papers, lambda one: f"{words.in_cm(one.travel_m, 1)} cm"),
+        "small": words.labels(one for one in at_papers if abs(one.travel_m) < NEGLIGIBLE_M),
+        "deficits": deficits,
+        "parts": parts,
+        "counts": ", ".join(str(len(own)) for own in design.by_worm(readings).values()),
+        "papers": PAPERS.label,
+    }
+    if solved:
+        spread, scale = float(np.ptp(list(solved.values()))), float(np.mean(np.abs(list(solved.values()))))
+        sizes = [f"{words.in_cm(t)} cm at {MM * dt:g} ms and impratio {ratio:g}" for (dt, ratio), t in solved.items()]
+        found |= {
+            "sizes": words.listed(sizes),
+            "spread": spread,
+            "share": spread / scale,
+            "artefact": "no artefact of step or friction cone"
+            if spread < 0.2 * scale
+            else "known to that accuracy only",
+        }
     columns: Columns = {
         "worm": lambda one: one.worm.label,
         "friction (1)": lambda one: f"{one.value:g}",
@@ -107,21 +114,8 @@ def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
         "deficit, open loop (%)": lambda one: words.in_percent(one.held_deficit, 1),
         "rhythm": lambda one: words.rhythm(one.rhythm),
     }
-    return Findings(
-        answer=f"At friction {PAPERS_FRICTION:g} the centre of mass travels {travels} forwards in 5 s; that is "
-        f"negligible for {words.labels(small)} of them. In open loop the deficit of segment 2 over all springs is "
-        f"{deficits}: friction makes {words.span(parts, PERCENT, 1)} percentage points of it.",
-        caption="Closed loop, 5 s, over the coefficient of friction: travel of the centre of mass, positive towards "
-        "the front, against the wave; elongation of segments 1 and 2 (2 with empty markers), mean of six springs; the "
-        "deficit of segment 2 below 1 in the same reading, in closed loop (filled) and open loop (empty); rhythm. One "
-        f"run a point, {', '.join(str(len(own)) for own in design.by_worm(readings).values())} frictions.",
-        table=tabulated(readings, columns),
-        remarks=[
-            *orders,
-            convergence or f"The quick effort runs {PAPERS.label} at friction {PAPERS_FRICTION:g} only.",
-        ],
-        numbers=numbers,
-    )
+    said = findings("friction", found, tabulated(readings, columns), ["full" if solved else "quick"], numbers)
+    return replace(said, remarks=[*orders, *said.remarks])
 
 
 def _draw(readings: Sequence[Reading], held: Sequence[Reading], stem: Path) -> None:
@@ -148,11 +142,8 @@ def _draw(readings: Sequence[Reading], held: Sequence[Reading], stem: Path) -> N
         save_both(figure, stem)
 
 
-FRICTION = Examination(
-    "friction",
-    "Friction of the floor",
-    "The paper's worm hardly gets anywhere. How do travel, elongation and rhythm depend on friction, and is "
-    "the middle segment's deficit friction's work?",
-    lambda effort: [*design.cases_of(_points(effort)), *_solved(effort).values()],
-    _examine,
-)
+def _cases(effort: Effort) -> list[Case]:
+    return [*design.cases_of(_points(effort)), *_solved(effort).values()]
+
+
+FRICTION = examination("friction", _cases, _examine)

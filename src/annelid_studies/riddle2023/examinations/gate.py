@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from math import nan
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -16,7 +16,7 @@ from annelid.experiment import Case, Outcome, Store
 from annelid.morphology import Array
 from annelid.simulation import open_run
 from annelid_studies.riddle2023 import words
-from annelid_studies.riddle2023.contents import Examination, Findings, Number
+from annelid_studies.riddle2023.contents import Findings, examination, findings
 from annelid_studies.riddle2023.examinations import design
 from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, SOFT, Worm
 from annelid_studies.riddle2023.words import MS
@@ -81,12 +81,6 @@ def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
     pairs = [(worm, pair) for worm, pairs in VARIANTS[effort].items() for pair in pairs]
     beats = [read_beat(worm, *pair, store[variant(worm, *pair)]) for worm, pair in pairs]
     _draw(beats, stem)
-    numbers: dict[str, Number] = {}
-    for beat in beats:
-        tag = f"{beat.worm.name}_{beat.start}_{beat.scheme}"
-        numbers[f"verdict_{tag}"] = words.kind(beat.rhythm)
-        numbers[f"period_{tag}_s"] = beat.rhythm.period_s
-        numbers[f"first_contraction_{tag}_s"] = beat.first_s
     flat = words.listed(
         f"{words.in_unit(beat.rhythm.period_s, MS, 1)} ms ({beat.start} start, {beat.scheme})"
         for beat in beats
@@ -103,22 +97,16 @@ def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
             words.in_unit(beat.first_s) if np.isfinite(beat.first_s) else "to the end"
         ),
     }
-    return Findings(
-        answer=_answer(beats),
-        caption=f"When which segment contracts in the first {_SHOWN_S:g} s of closed loop, for each start of the "
-        "sodium gates (toolbox: as SNS-Toolbox starts them; steady: at the steady state of their neuron's potential) "
-        "and each update order of the network, one run a row. At the right, the period or, where there is none, what "
-        "became of the rhythm; rows without either were not run.",
-        table=tabulated(beats, columns),
-        remarks=[
-            f"The planar worm has no dynamics of its own, so its period is the network's: {flat}. By the design of "
-            f"the network it is {3000.0 * DESIGN_INTERVAL_S:g} ms."
-        ],
-        numbers=numbers,
-    )
+    found = {
+        **_answer(beats),
+        "shown_s": _SHOWN_S,
+        "flat": flat,
+        "design_ms": 3000.0 * DESIGN_INTERVAL_S,
+    }
+    return findings("gate", found, tabulated(beats, columns), ["design"])
 
 
-def _answer(beats: Sequence[Beat]) -> str:
+def _answer(beats: Sequence[Beat]) -> dict[str, Any]:
     groups = grouped(beats, lambda beat: (beat.start, beat.worm))
     walking, lasting = [], []
     for start in STARTS:
@@ -135,11 +123,13 @@ def _answer(beats: Sequence[Beat]) -> str:
     changed = sum(len({words.kind(beat.rhythm) for beat in group}) > 1 for group in groups.values())
     periods = [[b.rhythm.period_s or nan for b in group if b.rhythm.is_one_wave] for group in groups.values()]
     spread = max((np.ptp(group) for group in periods if group), default=None)
-    return (
-        f"So many worms walk 1-2-3 with every update order that was run: {'; '.join(walking)}. The first contraction "
-        f"of segment 1 lasts {words.listed(lasting)}. The update order of the network changes the verdict in {changed} "
-        f"of {len(groups)} cases of a worm and a start, and the period by {words.in_unit(spread, MS, 0)} ms at most."
-    )
+    return {
+        "walking": "; ".join(walking),
+        "lasting": words.listed(lasting),
+        "changed": changed,
+        "groups": len(groups),
+        "spread_ms": None if spread is None else MS * spread,
+    }
 
 
 def _draw(beats: Sequence[Beat], stem: Path) -> None:
@@ -178,11 +168,8 @@ def _draw_beat(axes: Axes, row: int, beat: Beat) -> None:
     axes.annotate(text, (1.0, row), **place, fontsize=7.5, annotation_clip=False)
 
 
-GATE = Examination(
-    "gate",
-    "Gate start and update order",
-    "Does the rhythm depend on how the sodium gates start, and on the order in which the network's gates and "
-    "potentials are advanced?",
-    lambda effort: [variant(worm, *pair) for worm, pairs in VARIANTS[effort].items() for pair in pairs],
-    _examine,
-)
+def _cases(effort: Effort) -> list[Case]:
+    return [variant(worm, *pair) for worm, pairs in VARIANTS[effort].items() for pair in pairs]
+
+
+GATE = examination("gate", _cases, _examine)

@@ -19,7 +19,7 @@ from annelid.config import field_value
 from annelid.draw import canvas, panel_title, save_both
 from annelid.experiment import Case, Store
 from annelid_studies.riddle2023 import words
-from annelid_studies.riddle2023.contents import Examination, Findings, Number
+from annelid_studies.riddle2023.contents import Findings, Number, examination, findings
 from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, SOFT, Worm
 from annelid_studies.riddle2023.words import MM
 from annelid_studies.tables import tabulated
@@ -155,70 +155,46 @@ def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
     ]
     noisy_maps = [one for one in maps if max(one.chart.noises_m) > 0]
     _draw(maps, stem)
-    numbers: dict[str, Number] = {"noise_common_cells": float(len(common))}
+    numbers: dict[str, Number] = {}
     for one in maps:
-        of_worm = {
-            "noise_handled": handled_noise(one.cells),
-            "noise_tested": max(one.chart.noises_m),
-            "window": _in_mm(one.window),
-            "window_low": min(one.window, default=None),
-            "window_high": max(one.window, default=None),
-            "even_window": _in_mm(one.even_window),
-            "even_window_low": min(one.even_window, default=None),
-            "even_window_high": max(one.even_window, default=None),
-            "noise_handled_evenly": handled_noise(one.cells, is_even),
-            "walking_share": share(one.compared),
-            "even_share": share(one.compared, is_even),
-            "runs": float(sum(map(len, one.cells.values()))),
-        }
-        numbers |= {f"{name}_{one.worm.name}": value for name, value in of_worm.items()}
-    breadths = words.by_worm((one for one in maps if one.even_window), lambda one: f"{one.breadth:.1f}")
-    remarks = [
-        f"The largest tested tolerance with an even wave is so many times the smallest: {breadths}. The true windows "
-        "are wider, by up to the next tested tolerances.",
-        "The paper supposes that noise is handled by changing the sensor's threshold. The tolerances that keep every "
-        f"run in order, by noise: {'; '.join(map(_by_noise, noisy_maps))}.",
-        _sensor_in_words(max(noise for one in maps for noise in one.chart.noises_m)),
-    ]
+        numbers[f"noise_handled_{one.worm.name}"] = handled_noise(one.cells)
+        numbers[f"noise_tested_{one.worm.name}"] = max(one.chart.noises_m)
+        numbers[f"window_{one.worm.name}"] = _in_mm(one.window)
+    found: dict[str, Any] = {
+        "windows": words.by_worm(maps, lambda one: _in_mm(one.window)),
+        "even_windows": words.by_worm(maps, lambda one: _in_mm(one.even_window)),
+        "fragility": _fragility_in_words(maps, bool(common)),
+        "even": EVEN,
+        "seeds": maps[0].chart.n_seeds,
+        "duration_s": PAPERS.case(None).config.duration_s,
+        "breadths": words.by_worm((one for one in maps if one.even_window), lambda one: f"{one.breadth:.1f}"),
+        "by_noise": "; ".join(map(_by_noise, noisy_maps)),
+        **_of_sensor(max(noise for one in maps for noise in one.chart.noises_m)),
+        "papers": PAPERS.label,
+    }
     if effort == "full":
         noisy = [store[case].rhythm.is_one_wave for case in NOISY_AT_THE_PAPERS_STEP]
         numbers["walking_share_noisy_papers_step"] = sum(noisy) / len(noisy)
-        quiet = words.listed(
-            f"at {MM * tolerance:g} mm {words.rhythm(store[case].rhythm)}"
-            for tolerance, case in AT_THE_PAPERS_STEP.items()
-        )
-        remarks.append(
-            "The chain's map is of steps of 2 ms. At the paper's step of 1 ms and without noise its rhythm is "
-            f"{quiet}; with noise of {MM * NOISE_AT_THE_PAPERS_STEP_M:g} mm and the paper's tolerance, {sum(noisy)} of "
-            f"{len(noisy)} runs walk 1-2-3."
-        )
-    else:
-        remarks.append(f"The quick effort runs {PAPERS.label} at its own tolerance only.")
-    handled = words.by_worm(
+        found |= {
+            "quiet": words.listed(
+                f"at {MM * tolerance:g} mm {words.rhythm(store[case].rhythm)}"
+                for tolerance, case in AT_THE_PAPERS_STEP.items()
+            ),
+            "noise_mm": MM * NOISE_AT_THE_PAPERS_STEP_M,
+            "n_noisy": sum(noisy),
+            "of_noisy": len(noisy),
+        }
+    found["handled"] = words.by_worm(
         noisy_maps,
         lambda one: f"{words.in_unit(handled_noise(one.cells), MM, 0)} of {MM * max(one.chart.noises_m):g} mm",
     )
-    return Findings(
-        answer="Without noise the worm walks in one wave 1-2-3 at tolerances of "
-        f"{words.by_worm(maps, lambda one: _in_mm(one.window))}, and evenly at "
-        f"{words.by_worm(maps, lambda one: _in_mm(one.even_window))}. {_fragility_in_words(maps, bool(common))} The "
-        f"largest noise under which some tolerance keeps every run in this wave is, of the largest tested, {handled}.",
-        caption="Rhythm in closed loop over the tolerance of the stretch sensors and the standard deviation of their "
-        "noise. A cell's shade is the most frequent rhythm of its runs; the text says how many of them walk in a "
-        f"single wave 1-2-3, and below it their mean regularity: 1 for a perfectly even wave; with less than {EVEN:g} "
-        f"it limps. With noise a cell is {maps[0].chart.n_seeds} runs of {PAPERS.case(None).config.duration_s:g} s, "
-        "each with its own seed; without noise it is one run, which is deterministic. Blank cells were not run.",
-        table=tabulated(
-            [
-                (one, noise, [score for (_, level), cell in one.cells.items() if level == noise for score in cell])
-                for one in maps
-                for noise in one.chart.noises_m
-            ],
-            _COLUMNS,
-        ),
-        remarks=remarks,
-        numbers=numbers,
-    )
+    rows = [
+        (one, noise, [score for (_, level), cell in one.cells.items() if level == noise for score in cell])
+        for one in maps
+        for noise in one.chart.noises_m
+    ]
+    remarks = ["breadths", "thresholds", "sensor", effort]
+    return findings("noise", found, tabulated(rows, _COLUMNS), remarks, numbers)
 
 
 _Row = tuple[_Read, float, Sequence[RhythmScore]]
@@ -278,15 +254,16 @@ def _by_noise(one: _Read) -> str:
     return f"{one.worm.label} (own tolerance {MM * one.worm.tolerance_m:g} mm), {', '.join(parts)}"
 
 
-def _sensor_in_words(most_m: float) -> str:
+def _of_sensor(most_m: float) -> dict[str, Any]:
+    """What noise of a size on every spring is on what the sensor compares."""
     config = RIGID.case(None).config
     n_springs = field_value(config, "body.mesh.n_helices") // 2
-    return (
-        f"Noise is normal, and drawn anew for every spring and every {MM * config.clock.control_timestep_s:g} ms. The "
-        f"sensor compares the mean of a segment's {n_springs} springs with the tolerance, so {MM * most_m:g} mm on "
-        f"each spring are {MM * most_m / sqrt(n_springs):.1f} mm on what it compares. In cells where some runs walk "
-        "and some do not, chance decides."
-    )
+    return {
+        "step_ms": MM * config.clock.control_timestep_s,
+        "n_springs": n_springs,
+        "most_mm": MM * most_m,
+        "mean_mm": MM * most_m / sqrt(n_springs),
+    }
 
 
 def _draw(maps: Sequence[_Read], stem: Path) -> None:
@@ -326,11 +303,4 @@ def _draw_cell(axes: Axes, x: int, y: int, scores: Sequence[RhythmScore]) -> Non
     axes.text(x, y, text, color="white" if kind == "silent" else "black", **look)
 
 
-NOISE = Examination(
-    "noise",
-    "Sensor tolerance and noise",
-    "Within which tolerances of the stretch sensors, and up to which noise, does the worm keep its rhythm? How much of "
-    "the loop's fragility is the pins', and can noise be handled by changing the threshold, as the paper supposes?",
-    _cases,
-    _examine,
-)
+NOISE = examination("noise", _cases, _examine)

@@ -14,7 +14,7 @@ from annelid.config import field_value
 from annelid.draw import canvas, save_both
 from annelid.experiment import Case, Store
 from annelid_studies.riddle2023 import words
-from annelid_studies.riddle2023.contents import Examination, Findings
+from annelid_studies.riddle2023.contents import Findings, examination, findings
 from annelid_studies.riddle2023.examinations import design
 from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, SOFT, Columns, Point, Reading
 from annelid_studies.riddle2023.examinations.ranges import compiled_ranges
@@ -100,39 +100,49 @@ def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
 
     paper, stiffest = chains[0], chains[-1]
     paper_m, tight_m = paper.held_m[0], tight.held_m[0]
-    gaps_m, ring_m, tight_ring_m = paper.at_holds("pin_gap_m"), _rings(paper)[0], _rings(tight)[0]
     own_m = design.held_elongation(store[_OWN_DAMPING])[0]
-    settled = [design.held_elongation(store[case])[0] for case in _settling(effort)]
     walked = [one for one in sprung if one.walk]
-    ordered = words.listed(f"{one.value:g}" for one in walked if one.walks)
-    others = words.listed(f"{one.value:g} ({words.kind(one.closed.rhythm)})" for one in walked if not one.walks)
     common = [one for one in chains if sprung[0].value <= one.value <= sprung[-1].value]
     largest = max(abs(one.held_m[0] / _between(sprung, one.value) - 1.0) for one in common)
-    remarks = [
-        f"At {words.listed(f'{one.value:.0f}' for one in common)} N/m the chain's elongation is within "
-        f"{PERCENT * largest:.0f} % of that of rods with soft crossings, read between their own values"
-        f"{': the stiffness of the pins is what the two formulations have in common' if largest < 0.15 else ''}.",
-        f"In closed loop the sensor tolerance is {MM * SOFT.tolerance_m:g} mm, which was chosen for ties of "
-        f"{tie_stiffness_N_per_m(fast()):g} N/m. With it the rods walk 1-2-3 at {ordered} N/m, and not at {others} "
-        f"N/m. Rigid crossings at {MM * RIGID.tolerance_m:g} mm: {words.rhythm(tight.rhythm)}.",
-        "The rods with rigid crossings here have the muscles and the damping of those with soft ones, so that only the "
-        "pins differ. With the damping of their own preset they elongate by "
-        f"{words.in_cm(own_m)} cm, {_beside(own_m, tight_m)}.",
-    ]
-    if settled:
-        passes = abs(settled[1] / settled[0] - 1.0) < 0.5 * abs(own_m / tight_m - 1.0)
-        remarks.insert(
-            1,
-            "The stiffest chain here has ties of about "
-            f"{_rounded(stiffest.value)} N/m and elongates by {words.in_cm(stiffest.held_m[0])} cm, "
-            f"{_beside(stiffest.held_m[0], tight_m)} the rods with rigid crossings.",
-        )
-        remarks.append(
-            f"Held for {LONG_S:g} s in place of {HOLD_S:g} s, rods with rigid crossings elongate by "
-            f"{words.in_cm(settled[0])} cm with the damping of soft crossings and {words.in_cm(settled[1])} cm with "
-            "their own: what the damping changes "
-            f"{'passes; the readings are of meshes that still come to rest' if passes else 'lasts'}."
-        )
+    found: dict[str, Any] = {
+        "stiffness": paper.value,
+        "gap": paper.at_holds("pin_gap_m")[0],
+        "paper": paper_m,
+        "tight": tight_m,
+        "ratio": tight_m / paper_m,
+        "ring": _rings(paper)[0],
+        "tight_ring": _rings(tight)[0],
+        "stiffest": sprung[-1].value,
+        "reached": sprung[-1].held_m[0] / tight_m,
+        "n_chains": len(chains),
+        "n_sprung": len(sprung),
+        "common": words.listed(f"{one.value:.0f}" for one in common),
+        "largest": largest,
+        "alike": ": the stiffness of the pins is what the two formulations have in common" if largest < 0.15 else "",
+        "tolerance_mm": MM * SOFT.tolerance_m,
+        "own_stiffness": tie_stiffness_N_per_m(fast()),
+        "ordered": words.listed(f"{one.value:g}" for one in walked if one.walks),
+        "others": words.listed(f"{one.value:g} ({words.kind(one.closed.rhythm)})" for one in walked if not one.walks),
+        "rigid_tolerance_mm": MM * RIGID.tolerance_m,
+        "rigid_rhythm": words.rhythm(tight.rhythm),
+        "own": own_m,
+        "own_beside": _beside(own_m, tight_m),
+    }
+    remarks = ["formulations", "closed_loop", "damping"]
+    if effort == "full":
+        settled, settled_own = (design.held_elongation(store[case])[0] for case in _settling(effort))
+        passes = abs(settled_own / settled - 1.0) < 0.5 * abs(own_m / tight_m - 1.0)
+        found |= {
+            "chains_stiffest": _rounded(stiffest.value),
+            "chains_most": stiffest.held_m[0],
+            "chains_beside": _beside(stiffest.held_m[0], tight_m),
+            "long_s": LONG_S,
+            "usual_s": HOLD_S,
+            "settled": settled,
+            "settled_own": settled_own,
+            "verdict": "passes; the readings are of meshes that still come to rest" if passes else "lasts",
+        }
+        remarks = ["formulations", "stiffest_chain", "closed_loop", "damping", "settled"]
     columns: Columns = {
         "worm": lambda one: one.worm.label,
         "tie (N/m)": lambda one: _rounded(one.value) if one is not tight else "rigid",
@@ -141,33 +151,8 @@ def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
         "ring (m)": lambda one: words.each_in_unit(_rings(one), digits=3),
         "closed loop": lambda one: words.rhythm(one.rhythm),
     }
-    return Findings(
-        answer=f"The paper's pins give like springs of {paper.value:.0f} N/m: with segment 1 held contracted, strands "
-        f"part by up to {words.in_cm(gaps_m[0], 1)} cm at a pin, and the segment elongates by {words.in_cm(paper_m)} "
-        f"cm. Rigid crossings give {words.in_cm(tight_m)} cm, {tight_m / paper_m:.1f} times as much, at rings of "
-        f"{words.in_unit(ring_m)} and {words.in_unit(tight_ring_m)} m. Rods with ties of {sprung[-1].value:g} N/m "
-        f"reach {words.in_percent(sprung[-1].held_m[0] / tight_m)} % of that.",
-        caption="Open loop: each of the three segments is held contracted for 0.8 s in turn. Its elongation (mean of "
-        "six springs), the largest gap at any pin, and its ring's length, over the stiffness of the tie between pin "
-        f"and strand. One run a point; {len(chains)} of the paper's chain, {len(sprung)} of rods with sprung pins, one "
-        "of rods with rigid crossings, drawn at the right edge. The rhythm is that of closed loops of 5 s.",
-        table=tabulated(readings, columns),
-        remarks=remarks,
-        numbers={
-            "stiffness_paper_N_per_m": paper.value,
-            "elongation_paper_first_m": paper_m,
-            "elongation_tight_first_m": tight_m,
-            "elongation_sprung_at_paper_stiffness_first_m": _between(sprung, paper.value),
-            "elongation_stiffest_chain_first_m": stiffest.held_m[0] if effort == "full" else None,
-            "elongation_tight_own_damping_first_m": own_m,
-            "elongation_tight_settled_first_m": settled[0] if settled else None,
-            "tight_over_paper": tight_m / paper_m,
-            "pin_gap_paper_m": gaps_m.max(),
-            "ring_paper_first_m": ring_m,
-            "ring_tight_first_m": tight_ring_m,
-            "stiffnesses_that_walk_N_per_m": ordered,
-        },
-    )
+    numbers = {"elongation_tight_first_m": tight_m}
+    return findings("pins", found, tabulated(readings, columns), remarks, numbers)
 
 
 def _rings(reading: Reading) -> np.ndarray:
@@ -230,11 +215,8 @@ def _draw(readings: Sequence[Reading], stem: Path) -> None:
         save_both(figure, stem)
 
 
-PINS = Examination(
-    "pins",
-    "Crossings, from soft to rigid",
-    "The paper ties its strands with the engine's soft constraints. How soft are they, and what would tight "
-    "pins change?",
-    lambda effort: [*design.cases_of(_points(effort)), _OWN_DAMPING, *_settling(effort)],
-    _examine,
-)
+def _cases(effort: Effort) -> list[Case]:
+    return [*design.cases_of(_points(effort)), _OWN_DAMPING, *_settling(effort)]
+
+
+PINS = examination("pins", _cases, _examine)

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 from annelid.draw import canvas, save_both
 from annelid.experiment import Store
 from annelid_studies.riddle2023 import words
-from annelid_studies.riddle2023.contents import Examination, Findings
+from annelid_studies.riddle2023.contents import Findings, examination, findings
 from annelid_studies.riddle2023.examinations import design
 from annelid_studies.riddle2023.examinations.design import PAPERS, WORMS, Columns, Point, Reading
 from annelid_studies.riddle2023.words import CM, MM
@@ -43,18 +42,6 @@ def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
     thinnest = {one.worm: one for one in readings if one.value == thin}
     thickest = [one for one in readings if one.value == thick]
     keep = [one for one in thickest if one.walks]
-    # Names of numbers have the radius in micrometres.
-    in_micrometres = [replace(one, value=1e3 * one.value) for one in readings]
-    numbers = design.numbered(
-        in_micrometres,
-        {
-            "verdict_{value:.0f}um_{worm}": lambda one: words.rhythm(one.rhythm),
-            "force_{value:.0f}um_{worm}_N": lambda one: one.force_N,
-            "elongation_closed_first_{value:.0f}um_{worm}_m": lambda one: one.walked_m[0],
-        },
-    )
-    open_loop = [one for one in in_micrometres if one.hold]
-    numbers |= design.numbered(open_loop, {"elongation_open_first_{value:.0f}um_{worm}_m": lambda one: one.held_m[0]})
     tolerances = words.by_worm(thinnest.values(), lambda one: f"{MM * one.worm.tolerance_m:g} mm")
     held = words.by_worm(
         [one for one in thickest if one.hold],
@@ -63,12 +50,6 @@ def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
     forces = words.by_worm(
         thickest, lambda one: f"from {words.in_unit(thinnest[one.worm].force_N)} to {words.in_unit(one.force_N)} N"
     )
-    remarks = [
-        f"At {thick:g} mm: {'; '.join(f'{one.worm.label}: {words.rhythm(one.rhythm)}' for one in thickest)}."
-        f" The sensor tolerances are those of the presets, {tolerances}, which were found for the paper's radius."
-    ]
-    if effort == "quick":
-        remarks.append(f"The quick effort varies the radius of {words.labels(thickest)} only.")
     columns: Columns = {
         "worm": lambda one: one.worm.label,
         "radius (mm)": lambda one: f"{one.value:g}",
@@ -79,18 +60,21 @@ def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
         "median force (N)": lambda one: words.in_unit(one.force_N),
         "rhythm": lambda one: words.rhythm(one.rhythm),
     }
-    return Findings(
-        answer=f"Strands of {thick:g} in place of {thin:g} mm are {_stiffness(thick):.1f} times as stiff in bending. "
-        f"The elongation of segment 1 in open loop goes {held}. The median force in closed loop goes {forces}. At "
-        f"{thick:g} mm, {len(keep)} of {len(thickest)} worms keep the order 1-2-3: {words.labels(keep)}.",
-        caption="Top: elongation (mean of six springs) over the strands' radius at the same mass, in closed loop "
-        "(filled, largest in 5 s) and in open loop (empty, each segment held by itself). Bottom: median muscle force "
-        "while contracted, and the rhythm, both in closed loop. One run a point. Bending stiffness goes with the "
-        "fourth power of the radius.",
-        table=tabulated(readings, columns),
-        remarks=remarks,
-        numbers={"bending_stiffness_ratio": _stiffness(thick), **numbers},
-    )
+    found = {
+        "thin": thin,
+        "thick": thick,
+        "stiffer": _stiffness(thick),
+        "held": held,
+        "forces": forces,
+        "n_walking": len(keep),
+        "n": len(thickest),
+        "walking": words.labels(keep),
+        "rhythms": "; ".join(f"{one.worm.label}: {words.rhythm(one.rhythm)}" for one in thickest),
+        "tolerances": tolerances,
+        "worms": words.labels(thickest),
+    }
+    remarks = ["rhythms", *(["quick"] if effort == "quick" else [])]
+    return findings("radius", found, tabulated(readings, columns), remarks)
 
 
 def _draw(readings: Sequence[Reading], stem: Path) -> None:
@@ -123,10 +107,4 @@ def _draw(readings: Sequence[Reading], stem: Path) -> None:
         save_both(figure, stem)
 
 
-RADIUS = Examination(
-    "radius",
-    "Radius of the strands",
-    "Thicker strands of the same mass resist bending more. What becomes of elongation, force and rhythm?",
-    lambda effort: design.cases_of(_points(effort)),
-    _examine,
-)
+RADIUS = examination("radius", lambda effort: design.cases_of(_points(effort)), _examine)

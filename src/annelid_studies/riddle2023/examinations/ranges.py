@@ -12,7 +12,7 @@ from annelid.draw import canvas, save_both
 from annelid.experiment import Store
 from annelid.morphology import Array
 from annelid_studies.riddle2023 import words
-from annelid_studies.riddle2023.contents import Examination, Findings
+from annelid_studies.riddle2023.contents import Findings, examination, findings
 from annelid_studies.riddle2023.examinations import design
 from annelid_studies.riddle2023.examinations.design import PAPERS, WORMS, Point, Worm
 from annelid_studies.riddle2023.words import PERCENT
@@ -87,34 +87,26 @@ def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
         "deficit (%)": lambda one: words.in_percent(one.deficit(), 1),
         "rhythm": lambda one: one.rhythm,
     }
-    return Findings(
-        answer=f"Deficit of {first.worm.label} in closed loop: {words.in_percent(first.deficit(0))} % on the first "
-        f"helix with the ranges as compiled and {words.in_percent(first_equal.deficit(0))} % with equal ones; over all "
-        f"springs, {words.in_percent(first.deficit())} % and {words.in_percent(first_equal.deficit())} %. In open "
-        f"loop, over all springs, equal ranges leave {_left(opened)}. So the ranges make "
-        f"{words.span(shares, PERCENT, 0)} % of the deficit of a contraction held by "
-        f"itself{', which is most of it' if min(shares) > 0.5 else ', and the rest has other causes'}.",
-        caption="How far segment 2 elongates less than segment 1, with the three length ranges as the engine of the "
-        "paper's time compiled them and with equal ones. Left: first helix (closed loop: peak to peak), the paper's "
-        f"reading; the line is the paper's {words.in_percent(PAPER_MIDDLE_DEFICIT, 1)} %. Right: mean of the six "
-        "springs. One run a point, closed loop 5 s, open loop one contraction of 0.8 s a segment.",
-        table=tabulated(loops, columns),
-        remarks=[
-            f"The ranges as compiled begin at {' / '.join(f'{value:g}' for value in low)} m and end at "
-            f"{' / '.join(f'{value:g}' for value in high)} m for segments 1 / 2 / 3. A muscle's active force ends at a "
-            "length that follows from its range, and segment 2's begins "
-            f"{100 * (low[1] - (low[0] + low[2]) / 2):.1f} cm above the mean of its neighbours'.",
-            f"In closed loop, over all springs, equal ranges leave {_left(closed)}. With equal ranges the deficit in "
-            f"closed loop exceeds that in open loop by {beyond} percentage points. Equal muscles cannot make that "
-            "difference; in closed loop segments contract while others still relax.",
-            *([f"The quick effort leaves out {PAPERS.label}."] if effort == "quick" else []),
-        ],
-        numbers={
-            f"deficit{reading}_{one.loop}_{one.ranges}_{one.worm.name}": one.deficit(index)
-            for one in loops
-            for index, reading in enumerate(("", "_mean"))
-        },
-    )
+    found: dict[str, Any] = {
+        "worm": first.worm.label,
+        "helix": first.deficit(0),
+        "helix_equal": first_equal.deficit(0),
+        "springs": first.deficit(),
+        "springs_equal": first_equal.deficit(),
+        "left_open": _left(opened),
+        "shares": shares,
+        "most": ", which is most of it" if min(shares) > 0.5 else ", and the rest has other causes",
+        "paper": PAPER_MIDDLE_DEFICIT,
+        "begin": " / ".join(f"{value:g}" for value in low),
+        "end": " / ".join(f"{value:g}" for value in high),
+        "above_cm": 100 * (low[1] - (low[0] + low[2]) / 2),
+        "left_closed": _left(closed),
+        "beyond": beyond,
+        "papers": PAPERS.label,
+    }
+    remarks = ["compiled", "closed", *(["quick"] if effort == "quick" else [])]
+    numbers = {f"deficit_mean_{one.loop}_{one.ranges}_{one.worm.name}": one.deficit() for one in loops}
+    return findings("ranges", found, tabulated(loops, columns), remarks, numbers)
 
 
 def _left(rows: Sequence[tuple[_Loop, _Loop]]) -> str:
@@ -148,11 +140,4 @@ def _draw(rows: Sequence[tuple[_Loop, _Loop]], stem: Path) -> None:
         save_both(figure, stem)
 
 
-RANGES = Examination(
-    "ranges",
-    "Length ranges of the muscles",
-    "The engine of the paper's time gave each muscle a length range of its own. How much of the middle "
-    "segment's deficit is left when all have the same?",
-    lambda effort: design.cases_of(_points(effort)),
-    _examine,
-)
+RANGES = examination("ranges", lambda effort: design.cases_of(_points(effort)), _examine)

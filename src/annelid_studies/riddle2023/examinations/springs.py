@@ -11,7 +11,7 @@ from annelid.experiment import Store
 from annelid.morphology import Array
 from annelid.simulation import open_run
 from annelid_studies.riddle2023 import words
-from annelid_studies.riddle2023.contents import Examination, Findings, Number
+from annelid_studies.riddle2023.contents import Findings, examination, findings
 from annelid_studies.riddle2023.examinations import design
 from annelid_studies.riddle2023.examinations.design import PAPERS, WORMS, Columns, Point, Reading
 from annelid_studies.riddle2023.words import CM
@@ -39,12 +39,6 @@ def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
     readings = design.read(_points(effort), store)
     reaches = {one: _reach(one) for one in readings}
     _draw(reaches, stem)
-    numbers: dict[str, Number] = {}
-    for one, (shortest_m, _) in reaches.items():
-        kind = f"{_SPRINGS[one.value].replace(' ', '_')}_{one.worm.name}"
-        numbers[f"verdict_{kind}"] = words.rhythm(one.rhythm)
-        numbers[f"elongation_first_{kind}_m"] = one.walked_helix_m[0]
-        numbers[f"undershoot_{kind}_m"] = -shortest_m.min()
     bilateral = dict(zip(readings[1::2], readings[::2], strict=True))
     pulling = list(bilateral)
     lost = [f"{one.worm.label} ({words.rhythm(one.rhythm)})" for one in pulling if not one.walks]
@@ -64,18 +58,16 @@ def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
         "shortest below rest (cm)": lambda one: words.all_in_cm(-reaches[one][0]),
         "median force (N)": lambda one: words.in_unit(one.force_N),
     }
-    return Findings(
-        answer="With springs that only pull, these worms keep the order 1-2-3: "
-        f"{words.labels(one for one in pulling if one.walks)}; these do not: {words.listed(lost)}. The spring on the "
-        f"first helix of segment 1 then swings over {swings}. Segments shorten below their rest length by up to "
-        f"{shorten}.",
-        caption=f"Closed loop, 5 s, one run a group, {len(readings)} runs: from the shortest to the longest that each "
-        "segment becomes (mean of its six springs, against rest), and below each group its springs and rhythm. "
-        "Hatched: springs that only pull.",
-        table=tabulated(readings, columns),
-        remarks=[f"The quick effort leaves out {PAPERS.label}."] if effort == "quick" else [],
-        numbers=numbers,
-    )
+    found = {
+        "walking": words.labels(one for one in pulling if one.walks),
+        "lost": words.listed(lost),
+        "swings": swings,
+        "shorten": shorten,
+        "runs": len(readings),
+        "papers": PAPERS.label,
+    }
+    remarks = ["quick"] if effort == "quick" else []
+    return findings("springs", found, tabulated(readings, columns), remarks)
 
 
 def _draw(reaches: Mapping[Reading, tuple[Array, Array]], stem: Path) -> None:
@@ -106,11 +98,4 @@ def _draw(reaches: Mapping[Reading, tuple[Array, Array]], stem: Path) -> None:
         save_both(figure, stem)
 
 
-SPRINGS = Examination(
-    "springs",
-    "Springs that push or only pull",
-    "The paper says that its axial springs act only in tension; the authors' files have them act both ways. "
-    "Does it matter?",
-    lambda effort: design.cases_of(_points(effort)),
-    _examine,
-)
+SPRINGS = examination("springs", lambda effort: design.cases_of(_points(effort)), _examine)

@@ -16,7 +16,7 @@ from annelid.experiment import Case, Outcome, Store
 from annelid.morphology import Array
 from annelid.simulation import open_run
 from annelid_studies.riddle2023 import words
-from annelid_studies.riddle2023.contents import Examination, Findings, Number
+from annelid_studies.riddle2023.contents import Findings, Number, examination, findings
 from annelid_studies.riddle2023.examinations import design
 from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, SOFT, Columns, Point, Reading, Worm
 from annelid_studies.riddle2023.words import CM, MS
@@ -110,26 +110,11 @@ def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
             starts.setdefault(one.worm, {})[one.value] = read_start(one.hold)
     _draw(walks, starts, stem)
     own_walks = design.by_worm(walks)
-    numbers: dict[str, Number] = {
-        f"largest_walking_step_{worm.name}_s": max((one.value / MS for one in own if one.walks), default=None)
-        for worm, own in own_walks.items()
-    }
-    numbers |= design.numbered(
-        walks,
-        {
-            "verdict_{worm}_{value:g}ms": _fate,
-            "period_{worm}_{value:g}ms_s": lambda one: one.closed.summary.period_s,
-            "elongation_first_helix_{worm}_{value:g}ms_m": lambda one: one.walked_helix_m[0],
-            "elongation_mean_{worm}_{value:g}ms_m": lambda one: one.walked_m[0],
-            "real_time_factor_{worm}_{value:g}ms": _speed,
-        },
-    )
+    numbers: dict[str, Number] = {}
     early = []
     for worm, row in starts.items():
         for step, start in row.items():
-            numbers[f"ring_at_20ms_{worm.name}_{step:g}ms_m"] = start.at(EARLY_S)
             numbers[f"times_velocity_limit_{worm.name}_{step:g}ms"] = start.times_limit(EARLY_S)
-            numbers[f"velocity_limit_{worm.name}_m_per_s"] = start.limit_m_per_s
         reached = {step: start for step, start in row.items() if np.isfinite(start.at(EARLY_S))}
         factors = words.listed(words.in_unit(start.times_limit(EARLY_S), digits=1) for start in reached.values())
         early.append(f"{factors} times as far in {worm.label} at {_steps(reached)} ms")
@@ -149,26 +134,19 @@ def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
         "travel forwards (cm)": lambda one: words.in_cm(one.travel_m, 1),
         "times real time": lambda one: words.in_unit(_speed(one)),
     }
-    return Findings(
-        answer=" ".join(
-            [
-                *map(_walks_in_words, own_walks.values()),
-                f"A muscle has no force beyond its limit of velocity. In the first {MS * EARLY_S:g} ms of a "
-                f"contraction the ring shortens, compared with that limit, {words.listed(early)}.",
-            ]
-        ),
-        caption="Left: largest elongation of segment 1 (mean of its springs) in closed loop over the physics time "
-        f"step, one run a marker, {len(walks)} in all; a cross: the run does not walk 1-2-3. Right: ring of segment 1 "
-        f"over the first {MS * TRANSIENT_S:g} ms of its contraction in open loop, {sum(map(len, starts.values()))} "
-        "runs; the grey region cannot be reached by a muscle that has no force beyond its limit of velocity.",
-        table=tabulated(walks, columns),
-        remarks=[
-            _settling_in_words(starts),
-            f"At the largest step that walks, one core computes {words.listed(speeds)}, by the processor time of each "
-            "run.",
-        ],
-        numbers=numbers,
-    )
+    lengths, papers_step = _settling_in_words(starts)
+    found = {
+        "walks": " ".join(map(_walks_in_words, own_walks.values())),
+        "early": words.listed(early),
+        "early_ms": MS * EARLY_S,
+        "transient_ms": MS * TRANSIENT_S,
+        "n_walks": len(walks),
+        "n_starts": sum(map(len, starts.values())),
+        "lengths": lengths,
+        "papers_step": papers_step,
+        "speeds": words.listed(speeds),
+    }
+    return findings("timestep", found, tabulated(walks, columns), ["lengths", "speeds"], numbers)
 
 
 def _steps(steps_ms: Iterable[float]) -> str:
@@ -200,28 +178,28 @@ def _walks_in_words(own: Sequence[Reading]) -> str:
     )
 
 
-def _settling_in_words(starts: Starts) -> str:
+def _settling_in_words(starts: Starts) -> tuple[str, str]:
+    """Lengths of the rings early and late in a contraction, and whether its beginning is converged at 1 ms."""
+
     def lengths(row: Mapping[float, Start], time_s: float) -> str:
         return words.listed(f"{words.in_unit(start.at(time_s))} m at {step:g} ms" for step, start in row.items())
 
-    sentences = [
+    listed = " ".join(
         f"{words.capitalised(worm.label)}: ring of segment 1 {MS * EARLY_S:g} ms after the onset "
         f"{lengths(row, EARLY_S)}; after {MS * TRANSIENT_S:g} ms {lengths(row, TRANSIENT_S)}."
         for worm, row in starts.items()
-    ]
+    )
     paper = starts[PAPERS]
     finest = paper[min(paper)].at(EARLY_S)
     gap = paper[PAPERS_STEP_MS].at(EARLY_S) - finest
-    if abs(gap) > 0.02 * finest:
-        sentences.append(
-            f"So at the paper's step of {PAPERS_STEP_MS:g} ms the beginning of a contraction is not converged: the "
-            f"ring is {words.in_cm(abs(gap), 0)} cm {'shorter' if gap < 0 else 'longer'} than at {min(paper):g} ms. "
-            "An explicit step holds the muscle's force while the light pins gather speed, and so misses the steep fall "
-            "of the force with velocity."
-        )
-    else:
-        sentences.append(f"At the paper's step of {PAPERS_STEP_MS:g} ms the beginning is converged within 2 %.")
-    return " ".join(sentences)
+    if abs(gap) <= 0.02 * finest:
+        return listed, f"At the paper's step of {PAPERS_STEP_MS:g} ms the beginning is converged within 2 %."
+    return listed, (
+        f"So at the paper's step of {PAPERS_STEP_MS:g} ms the beginning of a contraction is not converged: the "
+        f"ring is {words.in_cm(abs(gap), 0)} cm {'shorter' if gap < 0 else 'longer'} than at {min(paper):g} ms. "
+        "An explicit step holds the muscle's force while the light pins gather speed, and so misses the steep fall "
+        "of the force with velocity."
+    )
 
 
 def _draw(walks: Sequence[Reading], starts: Starts, stem: Path) -> None:
@@ -265,10 +243,4 @@ def _draw_starts(axes: Axes, starts: Starts) -> None:
     axes.set_ylim(0.9 * min(start.ring_m.min() for start in every), 1.03 * every[0].ring_m[0])
 
 
-TIMESTEP = Examination(
-    "timestep",
-    "Time step",
-    "Do order, period and elongation depend on the time step, and are the first instants of a contraction resolved?",
-    lambda effort: design.cases_of(_points(effort)),
-    _examine,
-)
+TIMESTEP = examination("timestep", lambda effort: design.cases_of(_points(effort)), _examine)

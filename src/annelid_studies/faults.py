@@ -104,7 +104,7 @@ class FaultState(SavedAndRecorded):
         sensed = plant.reset(0)
         if saved is not None:
             saved.set_state(state)
-        self._force_N = _to_the_left(plant, heading_deg, trial.push_N) if isinstance(plant, WormPlant) else None
+        self._force_N = _to_the_left(plant, heading_deg, trial.push_N) if isinstance(plant, WormPlant) else np.zeros(0)
         self._n_stretch = sensed.stretch_m.size
         self._n_values = sum(getattr(sensed, name).size for name in SENSORS)
         self.reset(0)

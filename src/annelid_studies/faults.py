@@ -11,7 +11,6 @@ from pydantic import Field
 from annelid.clock import SLACK_S
 from annelid.config import ArenaKind, NonNegative, Positive, Share, TrialKind, default_of
 from annelid.control import SavedWrapper, WrappedController
-from annelid.morphology import heading_turn
 from annelid.protocols import Array, Controller, Plant, SavedAndRecorded, Sensation, Stateful
 from annelid.simulation import WormPlant
 
@@ -192,9 +191,9 @@ def _slot(time_s: float, length_s: float) -> int:
 
 def _to_the_left(plant: WormPlant, heading_deg: float, force_N: float) -> Array:
     """A force on the ring of the middle segment to the worm's left, ``(n_crossings, 3)``."""
-    ring = plant.geometry.rings[plant.n_segments // 2]
+    ring, angle = plant.geometry.rings[plant.n_segments // 2], np.radians(heading_deg)
     force = np.zeros((plant.geometry.n_crossings, 3))
-    force[ring] = force_N / len(ring) * (heading_turn(heading_deg) @ np.array([0.0, -1.0, 0.0]))
+    force[ring] = force_N / len(ring) * np.array([np.sin(angle), -np.cos(angle), 0.0])
     return force
 
 

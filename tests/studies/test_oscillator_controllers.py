@@ -223,20 +223,6 @@ def test_noise_is_continued_bit_for_bit(tmp_path: Path) -> None:
     joined_equal(first, simulate(planar("shc", 1.0, **noisy), tmp_path / "2", resume=first, progress=False), whole)
 
 
-def rods(kind: str, duration_s: float) -> RunConfig:
-    coarse = {"body.mesh.elements_per_side": 1, "clock.control_timestep_s": 0.005, "duration_s": duration_s}
-    return load_config("riddle2023-rods", {"controller": {"kind": kind}, **coarse})
-
-
-@pytest.mark.parametrize("kind", ["sine", "shc"])
-def test_a_worm_of_rods_is_driven_and_continues_bit_for_bit(kind: str, tmp_path: Path) -> None:
-    whole = simulate(rods(kind, 0.4), tmp_path / "3", progress=False)
-    first = simulate(rods(kind, 0.2), tmp_path / "1", progress=False)
-    joined_equal(first, simulate(rods(kind, 0.4), tmp_path / "2", resume=first, progress=False), whole)
-    rings = whole.data["ring_length"].values
-    assert rings[:, 0].min() < 0.9 * rings[0, 0]
-
-
 def test_contact_cue_is_the_size_of_the_force_on_the_segment_before() -> None:
     config = load_config("riddle2023-rods", {"controller": {"kind": "shc", "feedback": "contact"}})
     assert isinstance(config.controller, HeteroclinicChannel)

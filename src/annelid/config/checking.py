@@ -285,7 +285,9 @@ def _explain(detail: ErrorDetails, root: type[Section], tree: Any) -> str:
     if kind == "extra_forbidden":
         unknown = str(detail["loc"][-1])
         path = ".".join([*parts, unknown])
-        if path in REPLACED and root is RunConfig:
+        # A constant of one kind may be a field of another.
+        elsewhere = path in CONSTANT and path in field_paths()
+        if path in REPLACED and root is RunConfig and not elsewhere:
             return f"{path} is no field any more: {REPLACED[path]}; leave it out"
         return f"unknown field {shown(path)}: {_nearest_fields(unknown, parts, section, root)}"
     path = ".".join(parts)

@@ -1,8 +1,7 @@
-"""The list of `annelid study gallery` is that of the pictures and of their pages; the command remakes them."""
+"""The list of `docs/site/gallery.py` is that of the pictures and of their pages; the command remakes them."""
 
 from __future__ import annotations
 
-import json
 import re
 import shlex
 from pathlib import Path
@@ -11,11 +10,10 @@ import pytest
 import tomlkit
 from doc_commands import PAGES, ROOT, Command, steps_in
 from test_doc_commands import check_annelid, check_program
-from typer.testing import CliRunner
 
-from annelid.cli import app
-from annelid_studies.commands.gallery import cases, makers, pictures
+from annelid.errors import ConfigError
 from fill_tables import MARKED
+from gallery import cases, main, make, makers, pictures
 
 GALLERY = "docs/gallery.md"
 SHOWN = re.compile(r"""(?:!\[[^\]]*\]\(|(?:src|poster)=")(?:docs/)?images/([^)"]+)[)"]""")
@@ -71,12 +69,9 @@ def test_the_sweep_is_that_of_its_page() -> None:
     assert tomlkit.parse(re.sub(r"^    ", "", block, flags=re.MULTILINE)).unwrap() == pictures()["sweep.png"].study
 
 
-def test_pictures_of_numbers_are_redrawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(ROOT)
+def test_pictures_of_numbers_are_redrawn(tmp_path: Path) -> None:
     names = [name for name, one in pictures().items() if one.results]
-    done = CliRunner().invoke(app, ["gallery", *names, "-q", "-o", f"{tmp_path}/made", "--kept", f"{tmp_path}/kept"])
-    assert done.exit_code == 0, done.output
-    assert done.stdout.split() == [f"{tmp_path}/made/{name}" for name in names]
+    assert make(names, tmp_path / "made", tmp_path / "kept") == [tmp_path / "made" / name for name in names]
     assert {path.read_bytes()[1:4] for path in (tmp_path / "made").iterdir()} == {b"PNG"}
 
 
@@ -85,19 +80,19 @@ def test_a_worm_is_drawn_once_its_run_is_there(tmp_path: Path, monkeypatch: pyte
     short = {"command": "annelid run riddle2022-planar --duration 0.2", "minutes": 0.1, "pages": []}
     listed = {"walk.png": short | {"maker": "frame", "time_s": 0.1}, "figure7.png": short | {"maker": "figure7"}}
     known = {name: type(pictures()["worm.png"])(**one) for name, one in listed.items()}
-    monkeypatch.setattr("annelid_studies.commands.gallery.pictures", lambda: known)
+    monkeypatch.setattr("gallery.pictures", lambda: known)
     for _ in range(2):
-        done = CliRunner().invoke(app, ["gallery", "-q", "-o", f"{tmp_path}/made", "--kept", f"{tmp_path}/kept"])
-        assert done.exit_code == 0, done.output
+        make((), tmp_path / "made", tmp_path / "kept")
     assert {path.name for path in (tmp_path / "made").iterdir()} == set(known)
     assert len(list((tmp_path / "kept" / "runs").glob("run-*"))) == 1
 
 
-def test_the_list_is_printed_and_unknown_names_are_refused() -> None:
-    listed = json.loads(CliRunner().invoke(app, ["gallery", "--list", "--json"]).stdout)
-    assert listed["slip.png"]["results"] == "slip.csv"
-    assert "slip.csv" in CliRunner().invoke(app, ["gallery", "--list"]).stdout
+def test_the_list_is_printed_and_unknown_names_are_refused(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("sys.argv", ["gallery.py", "--list"])
+    main()
+    assert "slip.png" in capsys.readouterr().out
     for name, sentence in (("slip", "slip.png"), ("live_view.png", "annelid view")):
-        refused = CliRunner().invoke(app, ["gallery", name])
-        assert refused.exit_code == 2
-        assert sentence in refused.output
+        with pytest.raises(ConfigError, match=sentence):
+            make([name])

@@ -29,7 +29,7 @@ NEWER_THAN_0_1 = {
         "pin_damping_Ns_per_m",
     ],
     "arena": ["kind", "backward_friction", "slope_deg", "rail_gap_m", "posts"],
-    "guard": ["depth_m", "stretch", "ring_closure"],
+    "guard": ["depth_m"],
 }
 
 
@@ -84,7 +84,7 @@ POSTS = {**RODS, "arena": {"kind": "floor", "posts": [[1.0, 2.0, 0.1]]}}
 @pytest.mark.parametrize(
     ("worm", "schema", "gone", "says"),
     [
-        (PRESSURE, 2, {"controller.landing": 0.0}, None),
+        (PRESSURE, 2, {"controller.landing": 0.0, "guard.stretch": 1.1}, None),
         (PRESSURE, 2, {"controller.landing": 0.1}, "controller.landing was 0.1"),
         (RODS, 3, {"body.formulation.pin_inertance_kg": 0.0094}, None),
         (SOFT, 3, {"body.formulation.pin_inertance_kg": 0.0094}, "pin_inertance_kg was 0.0094"),

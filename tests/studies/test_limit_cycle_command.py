@@ -10,20 +10,20 @@ from outcome import Command
 
 def test_json_holds_the_numbers_and_nothing_else(annelid: Command) -> None:
     done = annelid(
-        "study", "limit-cycle", "--json", "--time", "located", "--neuron", "contraction_2", "--threshold", "12"
+        "study", "limit-cycle", "--json", "--time", "steps", "--neuron", "contraction_2", "--threshold", "12"
     )
     read = json.loads(done.out)
     assert (read["name"], read["n_segments"]) == ("riddle2022-planar", 3)
-    assert read["located"]["period_s"] == pytest.approx(2.625, abs=0.003)
-    response = read["located"]["phase_response_s"]
-    assert len(response) == len(read["located"]["phase_s"])
-    assert len(response[0]) == len(read["located"]["states"]) == 21
+    assert read["steps"]["period_s"] == pytest.approx(2.625, abs=0.003)
+    response = read["steps"]["phase_response_s"]
+    assert len(response) == len(read["steps"]["phase_s"])
+    assert len(response[0]) == len(read["steps"]["states"]) == 21
 
 
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (("riddle2023-rods",), "choose a planar body"),
+        (("riddle2023-rods",), "choose the body riddle2022"),
         (("--set", "sensor.noise_m=0.001"), "set sensor.noise_m=0"),
         (("--neuron", "contractoin_1"), "did you mean 'contraction_1'"),
         (("--time", "continuos"), "did you mean 'continuous'"),

@@ -11,7 +11,7 @@ from annelid.body.worm import WormBody
 from annelid.config import load_config
 from annelid.draw.camera import picture_axes
 from annelid.draw.scene import render_still
-from annelid.errors import RenderingUnavailable, RunFileError
+from annelid.errors import ConfigError, RenderingUnavailable, RunFileError
 from annelid.morphology import MeshGeometry
 from annelid.simulation.runfile import Run
 from annelid_studies.riddle2023.figures import renderings
@@ -152,9 +152,9 @@ def test_near_and_far_rhombi_are_unactuated_and_off_the_contracted_ring(rods_run
 
 
 def test_planar_worms_and_times_outside_are_refused(planar_run: Run, rods_run: Run, tmp_path: Path) -> None:
-    with pytest.raises(RunFileError, match="planar"):
+    with pytest.raises(ConfigError, match="this needs the 3D worm"):
         figure_4_model(planar_run.config, tmp_path / "figure")
-    with pytest.raises(RunFileError, match="planar"):
+    with pytest.raises(ConfigError, match="this needs the 3D worm"):
         figure_8_propagation(planar_run, tmp_path / "figure")
     with pytest.raises(RunFileError, match=r"no picture at 1\.5 s"):
         figure_2_propagation(rods_run, tmp_path / "figure")

@@ -46,7 +46,7 @@ _OLD: Mapping[str, tuple[str, ...]] = {
     "pseudo-robot": ("loop", "--pseudo"),
     **dict.fromkeys(("plot", "render"), ("draw",)),
     **{name: ("list", name) for name in ("presets", "arenas", "runs")},
-    **{name: ("study", name) for name in ("limit-cycle", "bench", "robustness", "challenge", "gallery")},
+    **{name: ("study", name) for name in ("limit-cycle", "bench", "robustness", "challenge")},
 }
 """What commands of before are now; they go on for one release."""
 WIDEST = 200

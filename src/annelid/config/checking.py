@@ -135,6 +135,9 @@ REPLACED = {
 }
 """What replaced fields that older files have, by their dotted paths."""
 CONSTANT = {
+    "guard.pin_gap_m": 0.15,
+    "guard.ring_closure": 1.0,
+    "guard.stretch": 1.1,
     "controller.capacitance_nF": 5.0,
     "controller.leak_conductance_uS": 1.0,
     "controller.range_mV": 20.0,

@@ -6,12 +6,9 @@ import hashlib
 import json
 import os
 import platform
-import subprocess
-import sys
-import tempfile
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
+from importlib.resources import files
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any
@@ -19,15 +16,18 @@ from typing import Any
 import numpy as np
 
 from annelid.errors import AnnelidError, RunFileError
-from annelid.experiment import StudyProgress, case_key, code_fingerprint
+from annelid.experiment import Processes, StudyProgress, case_key, code_fingerprint
 from annelid.output import write_json, write_text
 from annelid.simulation import locks
-from annelid.textfiles import read_json
+from annelid.textfiles import parse_toml, read_json
 from annelid_studies.bench.cases import BenchCase, as_it_is, bench_cases, converged
+from annelid_studies.bench.measure import measure_alone
 from annelid_studies.worms import CHAIN, RODS, Effort
 
 JSON_NAME = "bench.json"
 CASES_FOLDER = "cases"
+SCHEMA = "schema.toml"
+"""What its entries are."""
 
 QUANTITIES = ("elongation", "period", "travel", "work", "slip")
 """What a run is judged by."""
@@ -38,33 +38,8 @@ SCALED_SEGMENTS = (12, 30)
 SLOWDOWN = 0.1
 """By which a case may be slower than before, against the yardstick."""
 
-SCHEMA = {
-    "cases[].step_median_ms, step_mean_ms": "wall-clock time of the closed loop a physics step, recording included, ms",
-    "cases[].step_quiet_ms, yardstick_ms": "10th percentile of a step, and of one of a small model of the engine alone "
-    "timed in the same process before and after, ms",
-    "cases[].real_time_factor": "simulated over wall-clock time, recording included",
-    "cases[].peak_memory_MB": "largest resident memory of the process that ran the case and nothing else, 1e6 bytes",
-    "cases[].build_s, compile_s": "making the engine's specification, and the engine's compilation of it, s",
-    "cases[].velocities": "degrees of freedom of the model",
-    "cases[].shares": "fractions of the wall-clock time: the engine's own timers over the first 2.7 s, the rest of the "
-    "plant, the network with its control, and recording with the loop; they add up to 1",
-    "cases[].rhythm": "the score of the rhythm; errors of a rhythm that is not ordered are stated all the same",
-    "cases[].cpu_s": "processor time of the run with its recording, s",
-    "cases[].times_less_cpu": "on the line levels: processor time that riddle2023 takes for a simulated second, over "
-    "that of the case",
-    "cases[].errors": "by quantity, of the case as it is and of each perturbed one against the converged run of its "
-    "friction: relative errors as fractions, of the elongation of the segment that is furthest off, the period, the "
-    "travel, the muscles' work, and the slip (path over travel); largest: elongation or period",
-    "cases[].load_average_1min": "processes that competed for the cores when the case began; quiet below 1",
-    "cost_exponents": "slope of log(step_median_ms) against log(segments), by preset and range of segments",
-    "levels": "the case of each level of fidelity",
-}
-
 MEASURING = "annelid_studies.bench.measure"
 """The code that a measurement depends on beside the physics."""
-
-Share = Callable[[float], object]
-"""Called with the share of a case that is done."""
 
 # Importing, compiling, and the pass with the engine's timers.
 _OVERHEAD_S = 5.0
@@ -98,16 +73,12 @@ def bench(
     measured = {name: kept for name, case in wanted.items() if (kept := store.find(case)) is not None}
     costs_s = {name: _cost_s(case) for name, case in wanted.items() if name not in measured}
     total_s, done_s = sum(costs_s.values()) or 1.0, 0.0
-
-    def report(within_s: float) -> None:
-        if progress is not None:
-            progress("timing worms", len(measured), len(wanted), min(1.0, (done_s + within_s) / total_s))
-
     for name, cost_s in costs_s.items():
-        report(0.0)
+        if progress is not None:
+            progress("timing worms", len(measured), len(wanted), done_s / total_s)
         try:
-            measured[name] = store.measure(wanted[name], lambda share, cost_s=cost_s: report(share * cost_s))
-        except MeasurementFailed as failure:
+            measured[name] = store.measure(wanted[name])
+        except AnnelidError as failure:
             measured[name] = {"failed": str(failure)}
         done_s += cost_s
     content = {
@@ -115,7 +86,7 @@ def bench(
         "machine": f"{os.cpu_count()} cores, one of them used",
         "versions": {name: version(name) for name in ("annelid", "mujoco-core", "numpy")}
         | {"python": platform.python_version()},
-        "schema": SCHEMA,
+        "schema": parse_toml((files("annelid_studies.bench") / SCHEMA).read_text(encoding="utf-8"), SCHEMA),
         **judge(cases, measured),
     }
     return write_json(folder / JSON_NAME, content)
@@ -280,10 +251,6 @@ def _largest(values: Sequence[float | None]) -> float | None:
     return max(known) if known and len(known) == len(values) else None
 
 
-class MeasurementFailed(AnnelidError):
-    """A case could not be measured; the text says why."""
-
-
 class Measurements:
     """A folder of measurements of cases; it is made with the first."""
 
@@ -297,14 +264,15 @@ class Measurements:
         except (OSError, ValueError):
             return None
 
-    def measure(self, case: BenchCase, progress: Share) -> dict[str, Any]:
-        """Measures a case, and keeps the numbers.
+    def measure(self, case: BenchCase) -> dict[str, Any]:
+        """Measures a case in a process of its own, and keeps the numbers.
 
         Raises:
-            MeasurementFailed: The process died, or the case cannot be built.
+            AnnelidError: The process died, or the case cannot be built.
         """
         config, *perturbed = (one.model_dump(mode="json") for one in (case.case.config, *case.perturbed))
-        measured = _in_a_process({"config": config, "perturbed": perturbed}, progress)
+        with Processes(1) as process:
+            measured = process.submit(measure_alone, config, perturbed).result()
         self.folder.mkdir(parents=True, exist_ok=True)
         write_text(self._path(case), json.dumps(measured, indent=1, allow_nan=False))
         return measured
@@ -313,43 +281,3 @@ class Measurements:
         code = case_key(case.case) + code_fingerprint("annelid.analysis", MEASURING)
         stem = case.name.replace(", ", "-").replace(" ", "-")
         return self.folder / f"{stem}-{hashlib.sha256(code.encode()).hexdigest()[:12]}.json"
-
-
-def _in_a_process(request: dict[str, Any], progress: Share) -> dict[str, Any]:
-    with tempfile.TemporaryFile("w+", encoding="utf-8") as complaints:
-        child = subprocess.Popen(
-            [sys.executable, "-m", MEASURING],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=complaints,
-            text=True,
-            encoding="utf-8",
-        )
-        assert child.stdin is not None
-        assert child.stdout is not None
-        answer: dict[str, Any] = {}
-        try:
-            # A process that dies at once leaves its reason on stderr. Its stdin stays open: it ends when that closes.
-            with suppress(BrokenPipeError):
-                child.stdin.write(json.dumps(request) + "\n")
-                child.stdin.flush()
-            for line in child.stdout:
-                # A library may print too.
-                if line.startswith("{"):
-                    answer = json.loads(line)
-                    if "share" in answer:
-                        progress(answer["share"])
-            child.wait()
-        except BaseException:
-            child.kill()
-            child.wait()
-            raise
-        finally:
-            child.stdout.close()
-            with suppress(BrokenPipeError):
-                child.stdin.close()
-        if "measured" in answer:
-            return answer["measured"]
-        complaints.seek(0)
-        last = (complaints.read().strip().splitlines() or [f"the process ended with status {child.returncode}"])[-1]
-        raise MeasurementFailed(answer.get("error", last))

@@ -1,25 +1,19 @@
-"""One case, measured in a process of its own: ``python -m annelid_studies.bench.measure``, its request a line on stdin.
-
-Alone in a fresh process, a case's peak memory is its own. It ends when its stdin is closed, as it is by the end of its
-parent. Every line it prints is JSON: ``{"share": ..}`` as it goes on, then ``{"measured": ..}`` or ``{"error": ..}``.
-"""
+"""One case, measured in a process of its own: only there its peak memory is its own."""
 
 from __future__ import annotations
 
-import json
 import os
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
-from annelid.errors import AnnelidError, SimulationStopped
-from annelid.experiment import end_after
+from annelid.config import RunConfig, load_config
+from annelid.errors import SimulationStopped
 
 if TYPE_CHECKING:
-    from annelid.config import RunConfig
     from annelid.simulation import Run
 
 ENGINE_S, ENGINE_WALL_S = 2.7, 5.0
@@ -27,17 +21,10 @@ ENGINE_S, ENGINE_WALL_S = 2.7, 5.0
 _MB = 1e6
 
 
-def main() -> None:
-    """Reads the request, measures, and prints the answer."""
+def measure_alone(config: Mapping[str, Any], perturbed: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Measures a case, given as configurations, on one core; called in a fresh process."""
     keep_to_one_core()
-    request: dict[str, Any] = json.loads(sys.stdin.readline())
-    end_after(lambda: os.read(sys.stdin.fileno(), 1))
-    try:
-        from annelid.config import load_config
-
-        _say(measured=measure(load_config(request["config"]), [load_config(one) for one in request["perturbed"]]))
-    except AnnelidError as error:
-        _say(error=str(error))
+    return measure(load_config(config), [load_config(one) for one in perturbed])
 
 
 def keep_to_one_core() -> None:
@@ -70,14 +57,11 @@ def measure(config: RunConfig, perturbed: Sequence[RunConfig] = ()) -> dict[str,
     stepping = Stopwatch(plant, "step", "stride", reading=lambda: plant.data.time)
     watching, controlling = Stopwatch(plant, "alarm"), Stopwatch(controller, "step", "stride")
     before_ms = yardstick_ms()
-    n_runs = 1 + len(perturbed)
 
     def finished(number: int, config: RunConfig, folder: str, **parts: Any) -> Run:
         path = Path(folder) / str(number)
         try:
-            run = simulate(
-                config, path, progress=lambda s, _: _say(share=(number + 0.9 * s / config.duration_s) / n_runs), **parts
-            )
+            run = simulate(config, path, progress=False, **parts)
         except SimulationStopped:
             run = open_run(path)
         if run.status == "interrupted":
@@ -144,11 +128,3 @@ def peak_memory_bytes() -> int | None:
     except ImportError:
         return None
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
-
-
-def _say(**content: Any) -> None:
-    print(json.dumps(content, allow_nan=False), flush=True)
-
-
-if __name__ == "__main__":
-    main()

@@ -34,7 +34,7 @@ def limit_cycle_command(
     ] = None,
     times: Annotated[
         list[str] | None,
-        typer.Option("--time", metavar="WAY", help="continuous, located or stepped; may be repeated.  [default: all]"),
+        typer.Option("--time", metavar="WAY", help="continuous or steps; may be repeated.  [default: both]"),
     ] = None,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Picture to write: .png, .pdf, .svg  [default: none]")
@@ -47,10 +47,10 @@ def limit_cycle_command(
     cycle. Prints the period and the Floquet multipliers: what one cycle leaves of a deviation. All but one
     below 1 in magnitude: the rhythm comes back by itself; the one at 1 is a shift in time, which stays.
 
-    Time is taken in three ways: continuous, for the multipliers; located, in the worm's own steps, but each
-    ended where a stretch sensor switches; and stepped, in its own steps as they are in a run. The picture
-    shows the phase response too: by how much a kick of a neuron, at each phase, advances the rhythm.
-    Takes about ten seconds for 3 segments, twenty for 6; default preset: riddle2022-planar.
+    Time is taken in two ways: continuous, for the multipliers, and in the worm's own steps, each ended where a
+    stretch sensor switches, for the period of a run. The picture shows the phase response too: by how much a
+    kick of a neuron, at each phase, advances the rhythm. It takes about ten seconds for 3 segments, twenty
+    for 6. The body is riddle2022 and the controller sns; default preset: riddle2022-planar.
 
     \b
     annelid study limit-cycle riddle2022-planar --segments 6

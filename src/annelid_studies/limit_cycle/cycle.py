@@ -8,7 +8,6 @@ further away; `Continuous` and `Piecewise` of `annelid_studies.limit_cycle.flow`
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import reduce
 from itertools import accumulate
@@ -34,12 +33,14 @@ from annelid_studies.limit_cycle.flow import (
     travel,
 )
 
-Time = Literal["continuous", "located", "stepped"]  # how a worm's time is taken; see `limit_cycle`
+Time = Literal["continuous", "steps"]  # how a worm's time is taken; see `limit_cycle`
 
 # Step whose change is the vector field, and the step that the field is integrated with, s.
 _FIELD_STEP_S = 1e-5
 _CONTINUOUS_STEP_S = 1e-3
 _MOST_RETURNS, _MOST_NEWTON = 40, 12
+# Size of a perturbation, as a share of the state's range.
+_PERTURBATION = 1e-6
 # A closing error that shrinks by less than this factor a return calls for Newton's method.
 _SLOW = 0.5
 # Copies that run at once, for the processor's cache.
@@ -116,10 +117,9 @@ def limit_cycle(
 
     Args:
         config: A configuration with a planar body and the synthetic nervous system, without sensor noise.
-        time: ``"stepped"``: the worm as it runs, its sensors switching at whole steps only; ``"located"``: the same
-            steps, but shortened where a sensor switches; ``"continuous"``: the differential equation that the steps
-            approximate, integrated by a method of third order that also locates the kinks of the synapses. The
-            linearisation is faithful in the last only.
+        time: ``"steps"``: the worm's own steps, shortened where a sensor switches; ``"continuous"``: the differential
+            equation that the steps approximate, integrated by a method of third order that also locates the kinks of
+            the synapses. The linearisation is faithful in the latter only.
         neuron: The cycle begins when this neuron's potential rises through the threshold.
         threshold_mV: Relative to rest; default: half of the operating range R.
         settle_s: Simulated time before the search begins, s, longer than ``sensor.startup_hold_s``.
@@ -137,9 +137,7 @@ def limit_cycle(
     section = section_at(flow, neuron, 0.5 * network.range_mV if threshold_mV is None else threshold_mV)
     # The field's rounding, divided by its short step, leaves no more digits.
     tolerance = 1e-7 if time == "continuous" else 1e-9
-    return find_limit_cycle(
-        flow, state, switches, section, n_phases=n_phases, tolerance=tolerance, refine=time != "stepped"
-    )
+    return find_limit_cycle(flow, state, switches, section, n_phases=n_phases, tolerance=tolerance)
 
 
 def flow_of(config: RunConfig, time: Time = "continuous", settle_s: float = 5.0) -> tuple[Flow, Array, Switches]:
@@ -234,9 +232,7 @@ def find_limit_cycle(
     *,
     n_phases: int = 100,
     tolerance: float = 1e-9,
-    perturbation: float = 1e-6,
     longest_s: float = 60.0,
-    refine: bool = True,
 ) -> LimitCycle:
     """Finds the periodic orbit near a state, and linearises round it.
 
@@ -253,21 +249,16 @@ def find_limit_cycle(
         section: The event that ends a cycle.
         n_phases: Arcs, at least 1.
         tolerance: Closing error at which the orbit counts as closed, as a share of each state's range.
-        perturbation: Size of a perturbation, as a share of the state's range.
         longest_s: Longest cycle to wait for, s.
-        refine: Whether steps end where a switch moves; without, the derivative misses the saltations.
 
     Raises:
         NoLimitCycle: The section is not met, or the orbit does not close.
-        ConfigError: No arcs, or a perturbation or a tolerance that is not positive.
     """
-    for name, value in (("n_phases", n_phases), ("tolerance", tolerance), ("perturbation", perturbation)):
-        if not value > 0:
-            raise ConfigError(f"{name} = {value:g} must be greater than 0")
-    _, state, switches = crossing_times(flow, state, switches, section, longest_s, refine=refine)
+    orbit = _first_return(flow, state, switches, section, longest_s)
+    state, switches = orbit.state[-1:], orbit.switches[-1:]
     closing, n_returns, newton = np.inf, 0, 0
     while True:
-        orbit = _first_return(flow, state, switches, section, longest_s, refine)
+        orbit = _first_return(flow, state, switches, section, longest_s)
         end, last = orbit.state[-1:], orbit.switches[-1:]
         n_returns += 1
         before, closing = closing, float((np.abs(end - state) / orbit.range).max())
@@ -278,9 +269,9 @@ def find_limit_cycle(
                 f"the orbit does not close: after {n_returns} returns to the section its ends differ by {closing:.2g} "
                 f"of a state's range, more than {tolerance:g}"
             )
-        if refine and (newton or (n_returns > 3 and closing > _SLOW * before)):
+        if newton or (n_returns > 3 and closing > _SLOW * before):
             newton += 1
-            transition = _product(_transitions(flow, orbit, _arcs(orbit, n_phases), perturbation, refine))
+            transition = _product(_transitions(flow, orbit, _arcs(orbit, n_phases)))
             along = flow.step(end, last)[0][0] - end[0]
             project = np.eye(state.size)
             project[:, section.state] -= along / along[section.state]
@@ -289,7 +280,7 @@ def find_limit_cycle(
             end[:, section.state] = section.threshold
         state, switches = end, last
     arcs = _arcs(orbit, n_phases)
-    transitions = _transitions(flow, orbit, arcs, perturbation, refine)
+    transitions = _transitions(flow, orbit, arcs)
     monodromy = _product(transitions)
     multipliers, eigenvectors, adjoint = _decomposed(monodromy, orbit.range)
     state, switches = orbit.state[arcs], orbit.switches[arcs]
@@ -333,72 +324,32 @@ class _Orbit:
         return np.where(range_ > 0.0, range_, 1.0)
 
 
-def crossing_times(
-    flow: Flow,
-    state: Array,
-    before: Switches,
-    section: Section,
-    longest_s: float,
-    *,
-    count: int = 1,
-    refine: bool = True,
-) -> tuple[Array, Array, Switches]:
-    """Lets copies run, from where `travel` would, until they have met the section ``count`` times.
-
-    Returns:
-        Times, s, ``(n_copies,)``; states and switches there.
+def _first_return(flow: Flow, state: Array, before: Switches, section: Section, longest_s: float) -> _Orbit:
+    """Lets one copy run, step by step, until it next meets the section, on which its last step ends.
 
     Raises:
-        NoLimitCycle: A copy has not met it so often in ``longest_s``.
+        NoLimitCycle: It does not in ``longest_s``.
     """
     here = Copies.at(flow, state, before)
-    end, times = here[np.arange(len(state))], np.zeros(len(state))
-    for rows, _, there, taken, final in _steps_to(flow, here, section, longest_s, count, refine):
-        times[rows] += taken * flow.timestep_s
-        end[rows[final]] = there[final]
-    return times, end.state, end.switches
-
-
-def _first_return(
-    flow: Flow, state: Array, before: Switches, section: Section, longest_s: float, refine: bool
-) -> _Orbit:
-    """One copy from the section back to it, step by step."""
-    start = Copies.at(flow, state, before)
-    time, states, switches, moved = [0.0], [start.state[0]], [start.switches[0]], []
-    for _, here, there, taken, final in _steps_to(flow, start, section, longest_s, 1, refine):
-        if not final[0] and (there.switches != here.switches).any():
+    time, states, switches, moved = [0.0], [here.state[0]], [here.switches[0]], []
+    met = False
+    while not met:
+        if time[-1] * flow.timestep_s > longest_s:
+            raise NoLimitCycle(
+                f"{flow.labels[section.state]} does not rise through {section.threshold:g} within {longest_s:g} s: "
+                "choose another threshold or neuron, or a worm that oscillates"
+            )
+        there, taken = advance(flow, here, np.ones(1))
+        met = bool(here.state[0, section.state] < section.threshold <= there.state[0, section.state])
+        if met:
+            there, taken = _stop(flow, section, here, taken)
+        elif (there.switches != here.switches).any():
             moved.append(len(time))
         time.append(time[-1] + float(taken[0]))
         states.append(there.state[0])
         switches.append(there.switches[0])
+        here = there
     return _Orbit(np.array(time), np.array(states), np.array(switches), np.array(moved, dtype=np.intp))
-
-
-def _steps_to(
-    flow: Flow, here: Copies, section: Section, longest_s: float, count: int, refine: bool
-) -> Iterator[tuple[NDArray[np.intp], Copies, Copies, Array, NDArray[np.bool_]]]:
-    """Steps copies until they have met the section ``count`` times, on which their last steps end.
-
-    Yields at every step which copies take it, where it begins and ends, its share of a whole step, and which are done.
-    """
-    rows, times, counts = np.arange(len(here.state)), np.zeros(len(here.state)), np.zeros(len(here.state), dtype=int)
-    while rows.size:
-        if times[rows].max() > longest_s:
-            raise NoLimitCycle(
-                f"{flow.labels[section.state]} does not rise through {section.threshold:g} "
-                f"{'' if count == 1 else f'{count} times '}within {longest_s:g} s: "
-                "choose another threshold or neuron, or a worm that oscillates"
-            )
-        there, taken = advance(flow, here, np.ones(rows.size), refine)
-        low, high = here.state[:, section.state], there.state[:, section.state]
-        met = (low < section.threshold) & (high >= section.threshold)
-        counts[rows] += met
-        final = met & (counts[rows] == count)
-        if final.any():
-            there[final], taken[final] = _stop(flow, section, here[final], taken[final])
-        yield rows, here, there, taken, final
-        times[rows] += taken * flow.timestep_s
-        rows, here = rows[~final], there[~final]
 
 
 def _stop(flow: Flow, section: Section, here: Copies, share: Array) -> tuple[Copies, Array]:
@@ -423,9 +374,9 @@ def _arcs(orbit: _Orbit, n_phases: int) -> NDArray[np.intp]:
     return np.append(np.unique(candidates[np.minimum(nearest, len(candidates) - 1)]), last)
 
 
-def _transitions(flow: Flow, orbit: _Orbit, arcs: NDArray[np.intp], perturbation: float, refine: bool) -> Array:
+def _transitions(flow: Flow, orbit: _Orbit, arcs: NDArray[np.intp]) -> Array:
     """State-transition matrices of the arcs by central differences, ``(n_arcs, n_states, n_states)``."""
-    size = perturbation * orbit.range
+    size = _PERTURBATION * orbit.range
     kicks = np.concatenate([np.diag(size), -np.diag(size)])
     duration_s = np.diff(orbit.time[arcs]) * flow.timestep_s
     ends = np.empty((len(duration_s), *kicks.shape))
@@ -435,7 +386,7 @@ def _transitions(flow: Flow, orbit: _Orbit, arcs: NDArray[np.intp], perturbation
         starts = orbit.state[arcs[:-1][some], np.newaxis] + kicks
         switches = orbit.switches[arcs[:-1][some]].repeat(len(kicks), axis=0)
         durations = duration_s[some].repeat(len(kicks))
-        end = travel(flow, starts.reshape(-1, size.size), switches, durations, refine=refine)
+        end = travel(flow, starts.reshape(-1, size.size), switches, durations)
         ends[some] = end.state.reshape(starts.shape)
     plus, minus = ends[:, : size.size], ends[:, size.size :]
     return ((plus - minus) / (2.0 * size[:, np.newaxis])).transpose(0, 2, 1)
@@ -455,28 +406,3 @@ def _decomposed(monodromy: Array, scale: Array) -> tuple[NDArray[np.complex128],
     of_left, left = np.linalg.eig(scaled.T)
     adjoint = np.real(left[:, np.argmin(np.abs(of_left - 1.0))]) / scale
     return multipliers, (scale[:, np.newaxis] * vectors).astype(complex), adjoint
-
-
-def kicked_phase_response(
-    flow: Flow, cycle: LimitCycle, kicks: Array, phases: NDArray[np.intp], *, n_cycles: int = 3, longest_s: float = 60.0
-) -> Array:
-    """Measures phase response directly: kicks the system at a phase, and sees when it next meets the section.
-
-    Args:
-        flow: The system of the cycle.
-        cycle: Its limit cycle.
-        kicks: What is added to the states at once, ``(n_kicks, n_states)``; any size.
-        phases: Indices into the cycle's instants, ``(n_kicked,)``.
-        n_cycles: Which meeting with the section to compare, from 1; by then only the kick's phase should be left.
-        longest_s: Longest cycle to wait for, s.
-
-    Returns:
-        Advance of each phase by each kick, s, ``(n_kicked, n_kicks)``, within half a period of 0.
-    """
-    plain = np.zeros((1, kicks.shape[1]))
-    state = (cycle.state[phases, np.newaxis] + np.concatenate([plain, kicks])).reshape(-1, kicks.shape[1])
-    switches = cycle.switches[phases].repeat(len(kicks) + 1, axis=0)
-    times, _, _ = crossing_times(flow, state, switches, cycle.section, n_cycles * longest_s, count=n_cycles)
-    times = times.reshape(len(phases), -1)
-    advance_s = times[:, :1] - times[:, 1:]
-    return advance_s - cycle.period_s * np.round(advance_s / cycle.period_s)

@@ -3,7 +3,7 @@
 A step of a `Flow` is smooth as long as its switches, such as stretch sensors that are on or off, keep still. When one
 moves within a step, the step is shortened to the instant of the switch, which bisection finds, and a new one begins
 there, so that finite differences carry the jump of the vector field at the switch (the saltation matrix; Leine &
-Nijmeijer 2004, ch. 7). With ``refine=False`` switches move at whole steps only, as in a plain run.
+Nijmeijer 2004, ch. 7).
 """
 
 from __future__ import annotations
@@ -52,15 +52,6 @@ class Flow(Protocol):
 
 
 @runtime_checkable
-class Senses(Protocol):
-    """The capability of a plant of sensing without moving."""
-
-    def sense(self) -> Sensation:
-        """Returns the sensation at this instant."""
-        ...
-
-
-@runtime_checkable
 class BatchedPlant(Protocol):
     """The capability of a plant of advancing many copies at once.
 
@@ -102,9 +93,6 @@ class ClosedLoop:
     Integers, such as the number of steps taken, stay as they are now: what depends on them, a kick at the first step or
     a hold at the start, must be over by then. Potentials are labelled by their neurons, other states such as
     ``height[2]``.
-
-    All copies advance in one call where plant and controller are batched (`BatchedPlant`, `BatchedController`).
-    Otherwise each copy is restored, stepped and saved by itself: a period then costs one run per copy.
     """
 
     def __init__(
@@ -120,14 +108,14 @@ class ClosedLoop:
             kinks: Count kinks of the controller's equations among the switches, where it is `Piecewise`.
 
         Raises:
-            ConfigError: One of them cannot be saved and restored, the plant cannot sense, or there are too many states.
+            ConfigError: One of them cannot be saved, restored and advanced in many copies, or has too many states.
         """
-        for part, what in ((plant, "plant"), (controller, "controller")):
-            if not isinstance(part, Stateful):
+        for part, batched in ((plant, BatchedPlant), (controller, BatchedController)):
+            if not (isinstance(part, Stateful) and isinstance(part, batched)):
                 raise ConfigError(
-                    f"{type(part).__name__} has no limit cycle to find: a {what} needs get_state and set_state"
+                    f"{type(part).__name__} has no limit cycle to find, since copies of it cannot be advanced at once: "
+                    "choose the body riddle2022 and the controller sns"
                 )
-        self.batched = isinstance(plant, BatchedPlant) and isinstance(controller, BatchedController)
         self.timestep_s = control_timestep_s * stride
         self._stride = stride
         self._parts = (plant, controller)
@@ -145,10 +133,6 @@ class ClosedLoop:
                 f"{type(plant).__name__} and {type(controller).__name__} have {len(self.labels)} continuous states; "
                 f"the monodromy by finite differences takes at most {MOST_STATES}: choose a planar body"
             )
-        if not (self.batched or isinstance(plant, Senses)):
-            raise ConfigError(
-                f"{type(plant).__name__} has no limit cycle to find: a plant needs sense(), which returns its sensation"
-            )
 
     def present(self) -> tuple[Array, Switches]:
         """Returns states ``(1, n_states)`` and switches ``(1, n_switches)`` of plant and controller."""
@@ -159,7 +143,7 @@ class ClosedLoop:
     def step(self, state: Array, switches: Switches) -> tuple[Array, Switches]:
         """Advances copies by one step, as `Flow.step` says."""
         parts, n_copies = self._unpacked(state, switches), len(state)
-        after = self._step_batch(parts) if self.batched else self._step_each(parts, n_copies)
+        after = self._step_copies(parts)
         sensed = self._packed(after, "b", n_copies).astype(bool)
         return self._packed(after, "f", n_copies), self._with_pieces(parts, sensed)
 
@@ -192,25 +176,13 @@ class ClosedLoop:
             return sensed
         return np.concatenate([sensed, self._piecewise.pieces_copies(parts[1])], axis=1)
 
-    def _step_batch(self, parts: list[State]) -> list[State]:
+    def _step_copies(self, parts: list[State]) -> list[State]:
         plant, controller = cast(BatchedPlant, self._parts[0]), cast(BatchedController, self._parts[1])
         of_plant, of_controller = (part | rest for part, rest in zip(parts, self._rest, strict=True))
         for _ in range(self._stride):
             of_controller, activation = controller.step_copies(of_controller, plant.sense_copies(of_plant))
             of_plant = plant.step_copies(of_plant, activation)
         return [of_plant, of_controller]
-
-    def _step_each(self, parts: list[State], n_copies: int) -> list[State]:
-        plant, controller = self._parts
-        ends: list[list[State]] = []
-        for copy in range(n_copies):
-            for part, batch, rest in zip(self._parts, parts, self._rest, strict=True):
-                cast(Stateful, part).set_state({name: array[copy] for name, array in batch.items()} | rest)
-            sensation = cast(Senses, plant).sense()
-            for _ in range(self._stride):
-                sensation = plant.step(controller.step(sensation))
-            ends.append(self._states())
-        return [{name: np.stack([end[i][name] for end in ends]) for name in part} for i, part in enumerate(parts)]
 
 
 def _labels(part: object, name: str, size: int) -> list[str]:
@@ -287,11 +259,11 @@ class Copies:
         return flow.part(self.state, self.switches, self.ahead, share)
 
 
-def advance(flow: Flow, here: Copies, share: Array, refine: bool) -> tuple[Copies, Array]:
+def advance(flow: Flow, here: Copies, share: Array) -> tuple[Copies, Array]:
     """Takes a share of one step, or less, up to the first move of a switch; returns the share taken."""
     there = Copies.at(flow, here.part(flow, share), here.switches)
     moved = np.flatnonzero((there.switches != here.switches).any(axis=1) & (share > 0.0))
-    if not (refine and moved.size):
+    if not moved.size:
         return there, share
     base = here[moved]
 
@@ -314,11 +286,10 @@ def first_share(flow: Flow, here: Copies, share: Array, past: Callable[[Array], 
     return high
 
 
-def travel(flow: Flow, state: Array, before: Switches, duration_s: Array, *, refine: bool = True) -> Copies:
+def travel(flow: Flow, state: Array, before: Switches, duration_s: Array) -> Copies:
     """Lets copies, ``(n_copies, n_states)``, run for their own durations, s, ``(n_copies,)``; returns them at the ends.
 
-    ``before`` are the switches as they were before, ``(n_copies, n_switches)``; with ``refine`` steps end where one
-    moves.
+    ``before`` are the switches as they were before, ``(n_copies, n_switches)``.
     """
     left = np.asarray(duration_s, dtype=float) / flow.timestep_s
     done = Copies.at(flow, state, before)
@@ -326,7 +297,7 @@ def travel(flow: Flow, state: Array, before: Switches, duration_s: Array, *, ref
     while rows.size:
         # A remainder of 1e-9 steps is the rounding of sums of steps.
         share = np.where(np.abs(left[rows] - 1.0) < 1e-9, 1.0, np.minimum(left[rows], 1.0))
-        here, taken = advance(flow, here, share, refine)
+        here, taken = advance(flow, here, share)
         left[rows] -= taken
         ended = left[rows] < 1e-9
         if ended.any():

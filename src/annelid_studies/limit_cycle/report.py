@@ -14,8 +14,7 @@ if TYPE_CHECKING:
 _MULTIPLIERS_SHOWN = 4
 TIMES = {
     "continuous": "continuous time",
-    "located": "own steps, sensors located",
-    "stepped": "own steps",
+    "steps": "own steps",
 }
 """Headings of limit cycles, by `annelid_studies.limit_cycle.cycle.Time`."""
 # A smaller multiplier is lost in products of rounded matrices.

@@ -29,7 +29,7 @@ from annelid_studies.riddle2023.contents import EXAMINATIONS_TOML, Claim, Examin
 from annelid_studies.riddle2023.examinations import EXAMINATIONS
 from annelid_studies.riddle2023.examinations.design import walked_elongation
 from annelid_studies.riddle2023.figures import muscle_surface, planar_models, propagation, renderings, robot_lengths
-from annelid_studies.riddle2023.words import CM, MM, PERCENT, texts
+from annelid_studies.riddle2023.words import CM, MM, PERCENT, caption, texts
 from annelid_studies.worms import CHAIN, FAST, RODS, RODS_STEP_S, Effort, rods
 
 MAIN = Case(CHAIN)
@@ -106,12 +106,13 @@ def reproduce(
     if only is None:
         series = {f"{CHAIN}, first helix": walked_elongation(store[MAIN], first_helix=True).tolist()}
         series |= {f"{label}, mean of six": walked_elongation(store[variants[label]]).tolist() for label in _QUICK}
-        for number, (title, draw) in FIGURES.items():
+        for number, draw in FIGURES.items():
             report_drawing()
             stem = pictures / f"figure_{number}"
-            made_of = [store.path(MAIN).name, series]
+            text = texts("figures/figures.toml")[str(number)]
+            made_of = [store.path(MAIN).name, series, text]
             found = kept(stem, made_of, lambda draw=draw, stem=stem: {"caption": draw(main, series, stem)})
-            figures.append(Figure(number, title, stem.with_suffix(".png"), found["caption"]))
+            figures.append(Figure(number, text["title"], stem.with_suffix(".png"), found["caption"]))
         evidence = Evidence(store, effort, {one.examination.name: one.findings for one in examined})
         claims, judging = paper_claims(evidence), rule(evidence)
     report_drawing()
@@ -172,44 +173,26 @@ def _figure_6(run: Run, series: Series, stem: Path) -> str:
     network = peristalsis_network(run.config.body.n_segments, PeristalsisParameters())
     for suffix in (".svg", ".png"):
         network_figure(network, stem.with_suffix(suffix))
-    return (
-        "The network that controls the worm, drawn from the network object that the simulation steps: one column a "
-        "segment. The contraction and the expansion neuron (U1, U2) form a half-centre: they have a persistent sodium "
-        "channel (double outline) and inhibit each other. The sensory neuron (U3), which the stretch sensor excites "
-        "while its segment is at rest length, holds the segment expanded; the relay (U4) silences the sensory neuron "
-        "of the next segment, and that of the last segment closes the ring to the first."
-    )
+    return caption(6)
 
 
 def _figure_7(run: Run, series: Series, stem: Path) -> str:
     for suffix in (".svg", ".png"):
         figure7(run, stem.with_suffix(suffix))
-    return (
-        "The paper's run, reproduced: membrane potentials of the half-centres, the phases in which each segment's "
-        "muscle is active, and the lengths of the stretch sensors. The wave runs 1-2-3. A segment lengthens while "
-        "its contraction neuron is excited; its neighbours lengthen slightly at the same time. The thick lines are "
-        "the means of a segment's six springs, which the controller reads; the thin ones are the springs on the first "
-        "helix, whose peak to peak comes nearest to the paper's numbers."
-    )
+    return caption(7)
 
 
-FIGURES: Mapping[int, tuple[str, Callable[[Run, Series, Path], str]]] = {
-    1: ("The planar models", lambda run, series, stem: planar_models.figure_1_planar_models(stem)),
-    2: (
-        "Contraction with and without propagation of deformation",
-        lambda run, series, stem: propagation.figure_2_propagation(run, stem),
-    ),
-    4: ("The model", lambda run, series, stem: renderings.figure_4_model(run.config, stem)),
-    5: ("Force, length and velocity of the muscle", _figure_5),
-    6: ("The control network", _figure_6),
-    7: ("Potentials and stretch lengths", _figure_7),
-    8: ("Propagation of deformation at 1500 ms", lambda run, series, stem: propagation.figure_8_propagation(run, stem)),
-    9: (
-        "The robot's elongations beside ours",
-        lambda run, series, stem: robot_lengths.figure_9_robot_lengths(series, stem),
-    ),
+FIGURES: Mapping[int, Callable[[Run, Series, Path], str]] = {
+    1: lambda run, series, stem: planar_models.figure_1_planar_models(stem),
+    2: lambda run, series, stem: propagation.figure_2_propagation(run, stem),
+    4: lambda run, series, stem: renderings.figure_4_model(run.config, stem),
+    5: _figure_5,
+    6: _figure_6,
+    7: _figure_7,
+    8: lambda run, series, stem: propagation.figure_8_propagation(run, stem),
+    9: lambda run, series, stem: robot_lengths.figure_9_robot_lengths(series, stem),
 }
-"""Number: title, and what draws it and returns its caption. Figure 3 is a photograph of the robot."""
+"""What draws each figure and returns its caption."""
 
 
 def _variants_table(variants: Mapping[str, Outcome]) -> Table:

@@ -134,3 +134,8 @@ def filled(text: str, values: Mapping[str, Any]) -> str:
     ``%`` with none; ``cm.1`` has one. Several numbers become their range, and a missing one a dash.
     """
     return _Words().vformat(" ".join(text.split()), (), values)
+
+
+def caption(number: int, values: Mapping[str, Any] | None = None) -> str:
+    """Returns the caption of a figure, by the paper's number."""
+    return filled(texts("figures/figures.toml")[str(number)]["caption"], values or {})

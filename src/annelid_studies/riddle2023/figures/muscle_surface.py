@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from annelid.body import Rings, muscle_force
 from annelid.draw import canvas, panel_title, save_both, segment_colors
 from annelid.morphology import Array
-from annelid_studies.riddle2023.words import span
+from annelid_studies.riddle2023.words import caption
 
 SCALED_RANGE = (0.75, 1.05)
 """Scaled lengths between which a ring's operating range lies: MuJoCo's default."""
@@ -76,17 +76,20 @@ def figure_5_muscle_surface(rings: Rings, stem: Path, n_segments: int = 3) -> st
     grid = np.linspace(rings.minimum_length, 1.0, 20_001)
     settled = grid[np.searchsorted(engine_flv(grid, 0.0, rings), SETTLED_FORCE_N / peak_N)]
     settled_m = [far - (SCALED_RANGE[1] - settled) * unit for (_, far), unit in zip(ranges, optimal, strict=True)]
-    return (
-        "Force of MuJoCo's muscle as computed by the engine, relative to the peak force F0 and against length relative "
-        "to the optimal length L0: a) over length and velocity at full activation, b) cuts at four velocities. The "
-        f"engine agrees with the documented formula (circles) to {largest_difference(rings):.0e} F0; the passive "
-        f"force is {1.5 * rings.passive_peak:.2f} F0 at the maximum length, 1.5 times the parameter fpmax = "
-        f"{rings.passive_peak:g}. With optimal lengths of {span(optimal)} m the rings work between "
-        f"{RING_LENGTHS_M[0]:.2f} and {RING_LENGTHS_M[1]:.2f} m on the ascending limb (shaded, L = {low:.2f} to "
-        f"{high:.2f}), where the force falls to zero at {rings.minimum_length:g} L0. A full contraction against "
-        f"{SETTLED_FORCE_N:g} N ends at {settled:.2f} L0, with rings {span(settled_m)} m long: its end is set by "
-        f"length rather than by the peak force of {peak_N:.0f} N."
-    )
+    found = {
+        "difference": largest_difference(rings),
+        "passive": 1.5 * rings.passive_peak,
+        "rings": rings,
+        "optimal_m": optimal,
+        "work_m": RING_LENGTHS_M,
+        "low": low,
+        "high": high,
+        "settled_N": SETTLED_FORCE_N,
+        "settled": settled,
+        "settled_m": settled_m,
+        "peak_N": peak_N,
+    }
+    return caption(5, found)
 
 
 def _draw_surface(axes: Axes, rings: Rings, working: tuple[float, float]) -> None:

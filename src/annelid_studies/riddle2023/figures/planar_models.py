@@ -14,14 +14,7 @@ from annelid.errors import ConfigError
 from annelid.morphology import Array
 from annelid.protocols import Records
 from annelid.simulation import build_plant
-
-CAPTION = (
-    "Three planar models of worm segments, each as its planar plant rests with the middle segment contracted: a) "
-    "Riddle et al. 2022, hinged rhombi of rigid sides, whose heights w and lengths l obey l² + w² = 4 l_s², so that "
-    "the neighbours keep their shape; b) Daltorio et al., with torsional springs at the joints between segments, which "
-    "resist differences in height and draw the neighbours along; c) Boxerbaum et al., with torsional springs in the "
-    "middle of the otherwise rigid sides, which bend there. All have contractile actuators and axial return springs."
-)
+from annelid_studies.riddle2023.words import caption
 
 N_SEGMENTS = 3
 _CM = 100.0
@@ -98,7 +91,7 @@ def figure_1_planar_models(stem: Path) -> str:
             axes.set_aspect("equal")
             axes.axis("off")
         save_both(figure, stem)
-    return CAPTION
+    return caption(1)
 
 
 _PANELS = {

@@ -33,6 +33,7 @@ from annelid_studies.riddle2023.figures.rhombi import (
     rhombus_diagonals,
     rhombus_plane,
 )
+from annelid_studies.riddle2023.words import caption
 
 TIME_S = 1.5
 """The moment of the paper's figure 8, in the middle of the first contraction of segment 2."""
@@ -82,7 +83,8 @@ def measure_propagation(run: Run, time_s: float = TIME_S) -> Propagation:
     Of rhombi as near to the contracted ring or as far from it as each other, those that figure 8 shows best are taken.
 
     Raises:
-        RunFileError: The worm is planar, or no posture was recorded at that time.
+        ConfigError: The worm is planar.
+        RunFileError: No posture was recorded at that time.
     """
     posture = recorded_posture(run, time_s)
     geometry, segment = posture.geometry, _contracted(posture)
@@ -109,7 +111,8 @@ def figure_2_propagation(run: Run, stem: Path, time_s: float = TIME_S) -> str:
     """Draws rhombi that deform alone beside the same row of the compliant worm; returns the caption.
 
     Raises:
-        RunFileError: The worm is planar, or no posture was recorded at that time.
+        ConfigError: The worm is planar.
+        RunFileError: No posture was recorded at that time.
     """
     posture = recorded_posture(run, time_s)
     geometry, segment = posture.geometry, _contracted(posture)
@@ -148,23 +151,26 @@ def figure_2_propagation(run: Run, stem: Path, time_s: float = TIME_S) -> str:
         panel_title(right, f"b) with propagation: the mesh at {posture.time_s:.2f} s")
         save_both(figure, stem)
     beside = [k for k in (own - 1, own + 1) if 0 <= k < len(row)]
-    return (
-        f"One row of rhombi along the body while segment {segment + 1} contracts (orange, hatched; all others "
-        "black); below each rhombus the change of its length. a) Kinematic, with rigid sides: made as narrow as the "
-        f"contracted rhombus of b), that one lengthens by {_change(float(change_alone[own]))} and its neighbours keep "
-        f"their shape. b) The compliant worm at {posture.time_s:.2f} s, drawn facing that row, the rest of the mesh "
-        f"pale: the contracted rhombus lengthens by {_change(float(change[own]))}, and its neighbours in the row by "
-        f"{_change(float(change[beside].mean()))} on average. The row of {_CM * rest[0].sum():.1f} cm becomes "
-        f"{_CM * rigid[0].sum():.1f} cm long in a) and {_CM * mesh[0].sum():.1f} cm in b)."
-        f"{_pin_remark(posture, segment)}"
-    )
+    found = {
+        "segment": segment + 1,
+        "alone": _change(float(change_alone[own])),
+        "time_s": posture.time_s,
+        "change": _change(float(change[own])),
+        "beside": _change(float(change[beside].mean())),
+        "rest": rest[0].sum(),
+        "rigid": rigid[0].sum(),
+        "mesh": mesh[0].sum(),
+        "pins": _pin_remark(posture, segment),
+    }
+    return caption(2, found)
 
 
 def figure_8_propagation(run: Run, stem: Path, time_s: float = TIME_S) -> str:
     """Shows a near and a far rhombus of the worm, and the deformation of all of them; returns the caption.
 
     Raises:
-        RunFileError: The worm is planar, or no posture was recorded at that time.
+        ConfigError: The worm is planar.
+        RunFileError: No posture was recorded at that time.
     """
     measured = measure_propagation(run, time_s)
     posture = measured.posture
@@ -195,16 +201,23 @@ def figure_8_propagation(run: Run, stem: Path, time_s: float = TIME_S) -> str:
     near, far = measured.near, measured.far
     distance, axial = np.abs(measured.plane_distance_m), plane_means(measured.change.axial, posture.geometry)
     most, last = int(np.argmax(np.abs(axial))), int(np.argmax(distance))
-    return (
-        f"a) The compliant worm with segment {measured.segment + 1} contracted, at {posture.time_s:.2f} s ({how}; the "
-        f"contracted ring is thick and red). The near rhombus (green, solid), {_CM * abs(near.distance_m):.1f} cm from "
-        f"the ring at rest, {_muscle(posture, near)}, changes its length by {near.changes[0]} and its width by "
-        f"{near.changes[1]}; the far one (pink, dashed), {_CM * abs(far.distance_m):.1f} cm away, "
-        f"{_muscle(posture, far)}, by {far.changes[0]} and {far.changes[1]}. b, c) The same for every rhombus "
-        "(straight lines between opposite pins) with the mean of each plane, front on the left: the mean change of "
-        f"length is largest, {_change(1.0 + float(axial[most]))}, {_CM * distance[most]:.1f} cm from the ring, and "
-        f"{_change(1.0 + float(axial[last]))} at {_CM * distance[last]:.1f} cm.{_pin_remark(posture, measured.segment)}"
-    )
+    found = {
+        "segment": measured.segment + 1,
+        "time_s": posture.time_s,
+        "how": how,
+        "near_m": abs(near.distance_m),
+        "near_muscle": _muscle(posture, near),
+        "near": near.changes,
+        "far_m": abs(far.distance_m),
+        "far_muscle": _muscle(posture, far),
+        "far": far.changes,
+        "most": _change(1.0 + float(axial[most])),
+        "most_m": distance[most],
+        "last": _change(1.0 + float(axial[last])),
+        "last_m": distance[last],
+        "pins": _pin_remark(posture, measured.segment),
+    }
+    return caption(8, found)
 
 
 def _muscle(posture: Posture, measured: Measured) -> str:

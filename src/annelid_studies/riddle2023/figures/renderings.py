@@ -38,6 +38,7 @@ from annelid.draw import (
 from annelid.errors import RenderingUnavailable
 from annelid.morphology import Array, MeshGeometry
 from annelid.simulation import Run, compile_worm
+from annelid_studies.riddle2023.words import caption
 
 Place = Callable[[ArrayLike], Array]
 """From points in space, m, shape ``(..., 3)``, to the axes' coordinates, shape ``(..., 2)``."""
@@ -72,7 +73,7 @@ def rest_posture(config: RunConfig) -> Posture:
     """Returns the worm as its mesh is laid out.
 
     Raises:
-        RunFileError: The worm is planar.
+        ConfigError: The worm is planar.
     """
     geometry = _mesh(config)
     return Posture(config, geometry, float("nan"), geometry.crossings_m, geometry.vertices_m)
@@ -82,7 +83,8 @@ def recorded_posture(run: Run, time_s: float) -> Posture:
     """Returns the posture that a run recorded nearest to a time.
 
     Raises:
-        RunFileError: The worm is planar, or no posture was recorded at that time.
+        ConfigError: The worm is planar.
+        RunFileError: No posture was recorded at that time.
     """
     geometry, frame = _mesh(run.config), nearest_frame(run, time_s)
     recorded_s = float(run.data["frame_time"].values[frame])
@@ -226,7 +228,7 @@ def figure_4_model(config: RunConfig, stem: Path) -> str:
     """Shows the model at rest, in the axial and the isometric view; returns the caption.
 
     Raises:
-        RunFileError: The worm is planar.
+        ConfigError: The worm is planar.
     """
     posture = rest_posture(config)
     with canvas(3.3) as figure:
@@ -245,13 +247,6 @@ def figure_4_model(config: RunConfig, stem: Path) -> str:
         figure.legend(handles=handles, loc="outside lower center", ncols=4)
         save_both(figure, stem)
     geometry = posture.geometry
-    half = geometry.n_per_plane
     how = "rendered by MuJoCo" if rendering_works() else "drawn from the mesh's coordinates, not rendered"
-    return (
-        f"The model at rest, {how}, in a) the axial and b) the isometric view; what lies behind is paler. "
-        f"{geometry.n_strands} flexible strands (blue), {half} of each handedness, wind round a tube of "
-        f"{_CM * geometry.radius_m:.0f} cm radius and {_CM * geometry.length_m:.0f} cm length and are pinned to each "
-        f"other at {geometry.n_crossings} crossings (spheres). {geometry.n_segments} ring muscles (thick red) run "
-        f"round the body through {half} pins each, so at rest they are polygons, and {len(geometry.springs)} axial "
-        "springs (thin red) join pins that are two planes apart."
-    )
+    found = {"how": how, "geometry": geometry, "half": geometry.n_per_plane, "springs": len(geometry.springs)}
+    return caption(4, found)

@@ -12,18 +12,12 @@ from numpy.typing import ArrayLike
 
 from annelid.analysis import PAPER_ELONGATION_M, ROBOT_ELONGATION_M
 from annelid.draw import canvas, panel_title, save_both, segment_colors
+from annelid_studies.riddle2023.words import caption
 
 _CM = 100.0
 _BAR = 0.8
 _LABELS_WIDTH = 84
 """Characters of all labels side by side."""
-
-CAPTION = (
-    "Largest elongation of each segment of the physical robot (four segments, mean of the left and the right stretch "
-    "sensor), of the paper's model and of the present simulations, a) in centimetres and b) relative to segment 1. "
-    "In the robot the two middle segments elongate 37.8 % and 22.2 % less than segment 1, and the last differs from it "
-    "by 2.75 %. The original figure shows the robot's sensors over time; numbers are given of these maxima only."
-)
 
 
 def figure_9_robot_lengths(series: Mapping[str, Sequence[float]], stem: Path) -> str:
@@ -47,7 +41,7 @@ def figure_9_robot_lengths(series: Mapping[str, Sequence[float]], stem: Path) ->
         room = {"columnspacing": 1.2, "handlelength": 1.2, "borderaxespad": 0.1}
         absolute.legend(list(handles), names, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=len(most), **room)
         save_both(figure, stem)
-    return CAPTION
+    return caption(9)
 
 
 def _draw_bars(axes: Axes, groups: Sequence[ArrayLike], n_segments: int) -> None:

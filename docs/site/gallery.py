@@ -1,4 +1,11 @@
-"""The command `gallery`: makes the pictures of the documentation from the list in ``annelid_studies/gallery.toml``."""
+"""Makes the pictures of the documentation again, from the list in ``gallery.toml``.
+
+    python docs/site/gallery.py                         the pictures that take a few minutes or less
+    python docs/site/gallery.py slip.png arenas.png     only these, however long they take
+    python docs/site/gallery.py --list                  every picture with its command and its minutes
+
+Pictures of numbers in docs/results are redrawn from there; others are drawn from runs, which are kept in build/gallery.
+"""
 
 from __future__ import annotations
 
@@ -8,25 +15,21 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from functools import cache, partial
-from importlib.resources import files
 from math import nan
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import Any, NamedTuple
 
-import typer
-
-from annelid.cli import Jobs, Quiet, app, config_of, give, kept_runs, overrides_of, print_paths, study
+from annelid.cli import app, config_of, overrides_of
 from annelid.errors import ConfigError, RunKilled, suggest
+from annelid.experiment import Case, Store, study_progress
+from annelid.textfiles import parse_toml, read_json, read_text
 
-if TYPE_CHECKING:
-    from rich.table import Table
-
-    from annelid.experiment import Case, Store
-
+ROOT = Path(__file__).parent.parent.parent
+IMAGES, RESULTS, KEPT = ROOT / "docs" / "images", ROOT / "docs" / "results", ROOT / "build" / "gallery"
 QUICK_MINUTES = 3.0
-"""Pictures that take longer are made only if they are named, or with --all."""
+"""Pictures that take longer are made only if they are named."""
 TILE_PX, TILE_COLUMNS = (560, 350), 4
 PAGE_VIDEO_PX = (640, 400)
 
@@ -58,71 +61,43 @@ class Job(NamedTuple):
 @cache
 def pictures() -> dict[str, Picture]:
     """Reads the list: every picture by the name of its file."""
-    from annelid.textfiles import parse_toml
-
     name = "gallery.toml"
-    listed = parse_toml((files("annelid_studies") / name).read_text(encoding="utf-8"), name)
+    listed = parse_toml((Path(__file__).parent / name).read_text(encoding="utf-8"), name)
     return {picture: Picture(**entry) for picture, entry in listed.items()}
 
 
-@study("gallery")
-def gallery_command(
-    names: Annotated[
-        list[str] | None,
-        typer.Argument(metavar="[NAME]...", help="Pictures, such as slip.png.  [default: all that take minutes]"),
-    ] = None,
-    output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the pictures.")] = Path("docs/images"),
-    results: Annotated[Path, typer.Option(help="Folder of the result files.")] = Path("docs/results"),
-    kept: Annotated[Path, typer.Option(help="Folder in which runs are kept.")] = Path("build/gallery"),
-    every: Annotated[bool, typer.Option("--all", help="Also the pictures that take long, up to hours.")] = False,
-    as_list: Annotated[bool, typer.Option("--list", help="Only list the pictures.")] = False,
-    jobs: Jobs = None,
-    quiet: Quiet = False,
-) -> None:
-    """Make the pictures of the documentation again.
+def make(names: Sequence[str], output: Path = IMAGES, kept: Path = KEPT) -> list[Path]:
+    """Makes pictures.
 
-    A list names the command of each picture, what it takes, and the pages that show it. Pictures of numbers in
-    docs/results are redrawn from there; others are drawn from runs, which are kept, so that a second call takes
-    seconds. Without names it makes the pictures that take a few minutes or less. Call it in the repository.
+    Args:
+        names: Their names; none for all that take minutes.
+        output: Folder of the pictures.
+        kept: Folder in which runs are kept.
 
-    \b
-    annelid study gallery --list
-    annelid study gallery slip.png arenas.png
-    annelid study gallery -o drafts
+    Returns:
+        Paths of the pictures.
+
+    Raises:
+        ConfigError: There is no such picture, or it is made by hand.
     """
-    if as_list:
-        from annelid.terminal import Console
-
-        if not give({name: asdict(one) for name, one in pictures().items()}):
-            Console().print(_listing())
-        return
     made_by, known = makers(), pictures()
-    for name in names or []:
+    for name in names:
         if name not in known:
             raise ConfigError(f"there is no picture {name!r}: {suggest(name, known)}")
         if known[name].maker == "by-hand":
-            raise ConfigError(f"{name} is not remade by this command, but with: {known[name].command}")
-    chosen = names or [
-        name for name, one in known.items() if one.maker != "by-hand" and (every or one.minutes <= QUICK_MINUTES)
-    ]
-    output.mkdir(parents=True, exist_ok=True)
-    with kept_runs(kept, jobs=jobs, quiet=quiet) as store:
+            raise ConfigError(f"{name} is not remade here, but with: {known[name].command}")
+    chosen = names or [name for name, one in known.items() if one.maker != "by-hand" and one.minutes <= QUICK_MINUTES]
+    for folder in (output, kept):
+        folder.mkdir(parents=True, exist_ok=True)
+    with study_progress() as progress:
+        store = Store(kept / "runs", progress=progress)
         store.compute([case for name in chosen for case in cases(known[name]).values()], "gallery")
+        written = []
         for name in chosen:
             one = known[name]
-            drawn = made_by[one.maker](Job(one, kept / Path(name).stem, results / one.results, store))
-            print_paths([shutil.copyfile(drawn, output / name)])
-
-
-def _listing() -> Table:
-    from rich.table import Table
-
-    table = Table("picture", "minutes", "made from", "command", box=None)
-    table.columns[0].no_wrap = True
-    for name, one in pictures().items():
-        source = one.results or {"by-hand": "by hand", "command": "the command"}.get(one.maker, "runs")
-        table.add_row(name, f"{one.minutes:g}", source, one.command)
-    return table
+            drawn = made_by[one.maker](Job(one, kept / Path(name).stem, RESULTS / one.results, store))
+            written.append(Path(shutil.copyfile(drawn, output / name)))
+    return written
 
 
 def cases(picture: Picture) -> Mapping[str, Case]:
@@ -132,7 +107,6 @@ def cases(picture: Picture) -> Mapping[str, Case]:
     from typer.main import get_command
 
     from annelid.config import arena_names
-    from annelid.experiment import Case
 
     program: Any = get_command(app)
     above = program.make_context("annelid", [], resilient_parsing=True)
@@ -194,8 +168,6 @@ def _command(job: Job) -> Path:
 
 
 def _rows(job: Job) -> list[dict[str, str]]:
-    from annelid.textfiles import read_text
-
     return list(csv.DictReader(read_text(job.results).splitlines()))
 
 
@@ -219,7 +191,6 @@ def _slip(job: Job) -> Path:
 
 
 def _bench(job: Job) -> Path:
-    from annelid.textfiles import read_json
     from annelid_studies.bench.report import bench_figure
 
     return bench_figure(read_json(job.results), job.stem)
@@ -256,3 +227,20 @@ def makers() -> Mapping[str, Callable[[Job], Path]]:
         "tuning": _tuning,
         "uncertainty": _uncertainty,
     }
+
+
+def main() -> None:
+    """Lists the pictures, or makes those that are named."""
+    words = sys.argv[1:]
+    if words == ["--list"]:
+        for name, one in pictures().items():
+            print(f"{name:28} {one.minutes:5g} min   {one.command}")
+        return
+    try:
+        print(*make(words), sep="\n")
+    except ConfigError as error:
+        sys.exit(str(error))
+
+
+if __name__ == "__main__":
+    main()

@@ -20,7 +20,8 @@ from annelid.arena.surface import Shape
 from annelid.config import RunConfig
 from annelid.config.run import ArenaKind
 from annelid.draw.camera import FIELD_OF_VIEW_DEG, fitting_distance, picture_axes, view_angles
-from annelid.draw.scene import ROOM, upright
+from annelid.draw.drawn_worm import upright
+from annelid.draw.scene import ROOM
 from annelid.live.history import Moment
 from annelid.live.picture import CONTACT_COLOR, Painter
 from annelid.live.scene_geoms import SceneGeoms

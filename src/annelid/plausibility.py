@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from annelid.body.worm import worm_of
-from annelid.config.run import Finding, RunConfig
+from annelid.config.answers import Finding
+from annelid.config.run import RunConfig
 from annelid.errors import ConfigError
 
 __all__ = ["check", "refuse_nonsense", "tolerance_window_m"]

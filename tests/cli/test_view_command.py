@@ -24,7 +24,7 @@ def refusal(*words: str) -> str:
 
 
 def test_planar_worms_and_unknown_presets_are_refused() -> None:
-    assert "nothing to view in 3D" in refusal("riddle2022-planar")
+    assert "this needs the 3D worm" in refusal("riddle2022-planar")
     assert "did you mean 'riddle2023'" in refusal("ridle2023")
 
 

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from annelid.environments import WormEnv
-from annelid.environments.__main__ import action_table, observation_table
 from annelid.environments.task import Weights
 
 PAGE = (Path(__file__).parents[2] / "docs" / "environments.md").read_text(encoding="utf-8")
@@ -22,9 +21,8 @@ def env() -> WormEnv:
     return WormEnv()
 
 
-def test_the_tables_are_those_of_the_spaces(env: WormEnv) -> None:
-    assert observation_table(env) in PAGE
-    assert action_table(env) in PAGE
+def test_the_table_is_that_of_the_space(env: WormEnv) -> None:
+    assert env.layout.table() in PAGE
     assert f"`Box(.., ({env.layout.size},), float32)`" in PAGE
 
 

@@ -14,8 +14,7 @@ from annelid.arena.course import AHEAD, LEFT, UP
 from annelid.arena.kinds.floor import Floor
 from annelid.arena.kinds.pipe import Pipe
 from annelid.environments import WormEnv
-from annelid.environments.episode import Episode, Route
-from annelid.environments.task import task_of
+from annelid.environments.observation import Route
 
 BEND = Pipe(bore_m=0.18, course="bend", radius_m=0.8, turn_deg=90.0, straight_m=0.2)
 
@@ -43,13 +42,6 @@ def test_round_a_bend_the_route_is_the_arc_and_its_axes_turn(angle: float) -> No
     assert np.allclose(place.axes[2], UP)
 
 
-def test_where_the_pipe_begins_both_routes_agree() -> None:
-    middle = rings(np.array([0.3, 0.0, 0.18]))
-    pipe, floor = Route(BEND).place(middle), Route(Floor()).place(middle)
-    assert pipe.along_m == pytest.approx(floor.along_m)
-    assert np.allclose(pipe.axes, floor.axes)
-
-
 @pytest.mark.parametrize(
     ("arena", "changes", "goal"),
     [
@@ -64,19 +56,15 @@ def test_the_goal_lies_behind_all_that_bends_or_narrows(arena: str, changes: dic
 
 
 def test_passing_is_success_and_ends_the_episode() -> None:
-    options = {"fidelity": "coarse", "interval_s": 0.12, "episode_s": 6.0, "weights": None, "start_activation": 0.0}
-    task = task_of(CHEAP["preset"], CHEAP["changes"], arena="pipe.taper", **options)
-    worm = WormEnv(CHEAP["preset"], CHEAP["changes"], arena="pipe.taper").worm
-    start = Route(task.config.arena).place(worm.posture.crossing.take(worm.geometry.rings, axis=0).mean(axis=1))  # type: ignore[arg-type]
-    episode, random = Episode(replace(task, goal_m=start.along_m + 0.01), worm), np.random.default_rng(0)
-    episode.reset(random)
-    told, k = [], 0
-    while not told or not (told[-1].terminated or told[-1].truncated):
-        action = (np.arange(3) == (k // 3) % 3).astype(float)
-        told.append(episode.step(action, random))
-        k += 1
-    assert told[-1].terminated
-    assert told[-1].info["is_success"]
-    assert told[-1].info["reward_success"] == 10.0
-    assert told[-1].info["travel"] * worm.geometry.length_m >= 0.01
-    assert all(step.info["reward_success"] == 0.0 for step in told[:-1])
+    env = WormEnv(**CHEAP, arena="pipe.taper", episode_s=6.0, start_activation=0.0)
+    env.reset(seed=0)
+    env.task = replace(env.task, goal_m=env._start_m + 0.01)
+    infos, ended, passed = [], False, False
+    while not (ended or passed):
+        action = (np.arange(3) == (len(infos) // 3) % 3).astype(float)
+        *_, passed, ended, info = env.step(action)
+        infos.append(info)
+    assert passed
+    assert infos[-1]["is_success"]
+    assert infos[-1]["travel"] * env.worm.geometry.length_m >= 0.01
+    assert [info["reward_success"] for info in infos] == [*[0.0] * (len(infos) - 1), 10.0]

@@ -16,7 +16,7 @@ from worms import CHEAP, same
 
 from annelid.body.worm import WormBody
 from annelid.environments import ENVIRONMENTS, WormEnv
-from annelid.environments.task import Deed, Weights, reward_terms
+from annelid.environments.task import Weights, reward_terms
 from annelid.errors import AnnelidError, ConfigError, MissingDependency
 
 TERMS = ("reward_progress", "reward_effort", "reward_slip", "reward_success", "reward_failure")
@@ -62,12 +62,7 @@ def test_many_steps_are_the_same_to_the_last_bit(n_steps: int) -> None:
     # An episode has a hundred.
     assert len(first) == n_steps + 1 + n_steps // 100
     assert same(first, again)
-
-
-def test_another_seed_is_another_episode(env: WormEnv) -> None:
-    first, other = (rollout(env, 3, seed, np.random.default_rng(1)) for seed in (1, 2))
-    assert not same(first[0][0], other[0][0])
-    assert not same(first[-1][0], other[-1][0])
+    assert not same(first[0][0], worm_env(noisy).reset(seed=8)[0])
 
 
 def test_a_worm_at_rest_feels_nothing_and_lies_on_its_belly(env: WormEnv) -> None:
@@ -117,25 +112,21 @@ def test_progress_adds_up_to_the_way(env: WormEnv) -> None:
 
 
 numbers = st.floats(0.0, 10.0)
+actions = st.lists(st.floats(0, 1), min_size=1).map(np.array)
 
 
-@given(
-    st.builds(Weights, *[numbers] * 5),
-    st.builds(
-        Deed, numbers, numbers, st.lists(st.floats(0, 1), min_size=1).map(np.array), st.booleans(), st.booleans()
-    ),
-)
-def test_every_term_has_its_weight_and_sign(weights: Weights, deed: Deed) -> None:
-    terms = reward_terms(deed, weights, 0.5, 0.1)
+@given(st.builds(Weights, *[numbers] * 5), numbers, numbers, actions, st.booleans(), st.booleans())
+def test_every_term_has_its_weight_and_sign(
+    weights: Weights, speed: float, slip: float, action: np.ndarray, passed: bool, broke_down: bool
+) -> None:
+    terms = reward_terms(weights, speed, slip, action, passed=passed, broke_down=broke_down)
     assert tuple(terms) == TERMS
-    assert terms["reward_effort"] <= 0.0
-    assert terms["reward_slip"] <= 0.0
-    assert terms["reward_failure"] == (-weights.failure if deed.broke_down else 0.0)
-    assert terms["reward_success"] == (weights.success if deed.passed else 0.0)
-    if deed.broke_down:
-        assert terms["reward_progress"] == terms["reward_effort"] == terms["reward_slip"] == 0.0
-    else:
-        assert terms["reward_progress"] == pytest.approx(weights.progress * deed.advance_m / 0.05)
+    moved = not broke_down
+    assert terms["reward_progress"] == pytest.approx(moved * weights.progress * speed)
+    assert terms["reward_effort"] == pytest.approx(-moved * weights.effort * (action**2).mean())
+    assert terms["reward_slip"] == pytest.approx(-moved * weights.slip * slip)
+    assert terms["reward_success"] == passed * weights.success
+    assert terms["reward_failure"] == -broke_down * weights.failure
 
 
 @given(
@@ -145,7 +136,7 @@ def test_every_term_has_its_weight_and_sign(weights: Weights, deed: Deed) -> Non
 def test_activations_go_evenly_from_one_action_to_the_next(env: WormEnv, first: list[float], then: list[float]) -> None:
     env.reset(seed=0)
     env.step(np.array(first))
-    ramp = env._episode.activations(then)
+    ramp = env._ramp(then)
     assert ramp.shape == (3, 3)
     assert np.array_equal(ramp[-1], then)
     assert np.allclose(np.diff(np.vstack([first, ramp]), axis=0), np.subtract(then, first) / 3)
@@ -159,13 +150,6 @@ def test_an_observation_taken_apart_and_laid_out_is_itself(env: WormEnv, seed: i
     again = env.layout.packed(env.layout.named(observation))
     assert again in space
     assert np.allclose(again, observation, atol=1e-6)
-
-
-def test_many_observations_are_taken_apart_alike(env: WormEnv) -> None:
-    many = np.stack([env.observation_space.sample() for _ in range(6)]).reshape(2, 3, -1)
-    told = env.layout.named(many)
-    assert told["touch"].shape == (2, 3, 3, 4)
-    assert np.array_equal(told["touch"][1, 2], env.layout.named(many[1, 2])["touch"])
 
 
 def test_numbers_beyond_their_range_are_clipped(env: WormEnv) -> None:
@@ -187,7 +171,7 @@ def test_a_worm_whose_numbers_run_away_ends_the_episode_and_can_begin_anew() -> 
     assert frail.step(np.ones(3))[4]["stopped"] == info["stopped"]
 
 
-def test_an_engine_that_breaks_down_ends_the_episode(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_engine_that_breaks_down_ends_the_episode() -> None:
     broken = worm_env()
     broken.reset(seed=0)
     broken.worm.data.qvel[:] = np.nan  # type: ignore[attr-defined]
@@ -195,19 +179,8 @@ def test_an_engine_that_breaks_down_ends_the_episode(monkeypatch: pytest.MonkeyP
     assert terminated
     assert info["stopped"]
     assert np.isfinite(reward)
-    observation, _ = broken.reset()
-    assert np.isfinite(observation).all()
+    broken.reset()
     assert not broken.step(np.ones(3))[2]
-
-
-def test_weights_change_the_reward_and_nothing_else() -> None:
-    usual, greedy = worm_env(), worm_env(weights={"effort": 0.0, "progress": 2.0})
-    for env in (usual, greedy):
-        env.reset(seed=0)
-    (one, *_, told), (other, *_, told_greedy) = usual.step(np.ones(3)), greedy.step(np.ones(3))
-    assert same(one, other)
-    assert told_greedy["reward_progress"] == 2.0 * told["reward_progress"]
-    assert told_greedy["reward_effort"] == 0.0 != told["reward_effort"]
 
 
 def test_the_worm_is_the_presets_at_its_own_resolution_if_wanted() -> None:
@@ -246,7 +219,7 @@ def test_what_cannot_be_is_refused_in_one_sentence(options: dict[str, Any], sent
 
 
 def test_a_planar_worm_has_no_environment() -> None:
-    with pytest.raises(ConfigError, match="only the 3D worm"):
+    with pytest.raises(ConfigError, match="this needs the 3D worm"):
         WormEnv("riddle2022-planar", fidelity=None)
 
 

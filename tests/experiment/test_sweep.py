@@ -16,9 +16,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import annelid
-from annelid.config import Study, load_study, unit_of
+from annelid.config import Study, load_study
 from annelid.errors import ConfigError
-from annelid.experiment.space import unit_samples
+from annelid.experiment.space import spread_evenly, unit_samples
 from annelid.experiment.sweep import (
     Plan,
     Sweep,
@@ -29,7 +29,6 @@ from annelid.experiment.sweep import (
     results_table,
     shown_numbers,
     swept,
-    to_check,
     write_results,
 )
 from annelid.simulation.runfile import FILE_NAME
@@ -173,24 +172,6 @@ def test_what_is_no_study_is_refused_in_a_sentence(subtests: pytest.Subtests, tm
             assert not list(folder.iterdir())
 
 
-def test_the_unit_is_what_ends_a_fields_name(subtests: pytest.Subtests) -> None:
-    for path, unit in (
-        ("arena.radius_m", "m"),
-        ("body.rings.speed_limit_m_per_s", "m/s"),
-        ("controller.activation_slope_per_mV", "1/mV"),
-        ("body.springs.stiffness_N_per_m", "N/m"),
-        ("body.strands.joint_damping_Nms_per_rad", "N m s/rad"),
-        ("arena.gravity_m_per_s2", "m/s²"),
-        ("body.armature_kg_m2", "kg m²"),
-        ("sensor.noise_m", "m"),
-        ("arena.friction", ""),
-        ("body.mesh.n_segments", ""),
-        ("m", ""),
-    ):
-        with subtests.test(f"{path!r:.60}"):
-            assert unit_of(path) == unit
-
-
 REFUSED = [{"field": "body.gain", "values": [1.31, 1e4, -1.0]}, LISTED[0]]
 
 
@@ -273,38 +254,23 @@ def test_numbers_alone_may_be_kept_and_chosen(tmp_path: Path) -> None:
     assert data.duration_s.values == pytest.approx(0.2)
 
 
-@settings(max_examples=50)
-@given(
-    n_cells=st.integers(1, 12),
-    repeats=st.integers(1, 3),
-    n=st.integers(0, 40),
-    lost=st.sets(st.integers(0, 35)),
-)
-def test_runs_to_check_are_spread_and_of_every_cell_before_a_second_of_one(
-    n_cells: int, repeats: int, n: int, lost: set[int]
-) -> None:
-    plan = plan_of(study([{"field": GATE, "values": [100.0 + i for i in range(n_cells)]}], repeats=repeats))
-    usable = [i not in lost for i in range(n_cells * repeats)]
-    chosen = to_check(plan, n, usable)
-    assert len(chosen) == len(set(chosen)) == min(n, sum(usable))
-    assert all(usable[i] for i in chosen)
-    of_cell = [
-        [i in chosen for i in range(repeats * cell, repeats * (cell + 1)) if usable[i]] for cell in range(n_cells)
-    ]
-    most = max(map(sum, of_cell))
-    assert all(sum(its) >= most - 1 or all(its) for its in of_cell), "a second of one before the first of another"
-    if all(usable) and 1 < n <= n_cells:
-        cells = [i // repeats for i in chosen]
-        assert (cells[0], cells[-1]) == (0, n_cells - 1)
-        assert np.ptp(np.diff(cells)) <= 1
+@given(n=st.integers(0, 40), numbers=st.lists(st.integers(), unique=True, max_size=30).map(sorted))
+def test_runs_to_check_are_spread_from_the_first_to_the_last(n: int, numbers: list[int]) -> None:
+    chosen = spread_evenly(n, numbers)
+    assert len(set(chosen)) == len(chosen) == min(n, len(numbers))
+    places = [numbers.index(one) for one in chosen]
+    assert places == sorted(places)
+    if len(chosen) > 1:
+        assert (places[0], places[-1]) == (0, len(numbers) - 1)
+        assert np.ptp(np.diff(places)) <= 1
 
 
 def test_a_sample_of_a_sweep_is_checked_and_kept(tmp_path: Path) -> None:
     of = study([{"field": "body.gain", "values": [1.31, 1.4, 1.5, 1e4]}])
     done = swept(of, tmp_path, check=2)
-    assert list(done.checks) == [0, 2], "the last fails, so the nearest stands in"
+    assert list(done.checks) == [0, 2], "the last fails, so that the third is the last"
     assert done.data.check.values.tolist() == ["resolved", "", "resolved", ""]
-    assert checked_sentence(done) == "Checked 2 of 4 runs at half the step: all resolved."
+    assert checked_sentence(done) == "Checked 2 of 4 runs: all resolved."
     write_results(done)
     rows = list(csv.DictReader((tmp_path / "sweep.csv").read_text().splitlines()))
     assert [row["check"] for row in rows] == ["resolved", "", "resolved", ""]
@@ -317,27 +283,14 @@ def test_a_sample_of_a_sweep_is_checked_and_kept(tmp_path: Path) -> None:
 
 def test_what_is_not_resolved_is_named_with_what_moves_most(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("annelid.experiment.check.RESOLVED", 1e-9)
-    done = swept(study([{"field": "body.gain", "values": [1.31, 1.4]}], repeats=2), tmp_path, check=2)
-    assert list(done.checks) == [0, 2]
+    done = swept(study([{"field": "body.gain", "values": [1.31, 1.4]}]), tmp_path, check=2)
     found = checked_sentence(done)
-    assert found.startswith(
-        "Checked 2 of 4 runs at half the step: 0 resolved; not resolved: body.gain = 1.31, seed = 0 ("
-    )
-    assert re.search(r"body.gain = 1.4, seed = 0 \([a-z ]+ [0-9.e-]+ %( and \d+ more)?\)\.$", found)
-    assert all(text.startswith("Not resolved: with half the step") for text in done.data.check.values[:, 0])
-    assert done.data.check.values[:, 1].tolist() == ["", ""]
+    assert re.fullmatch(r"Checked 2 of 2 runs: 0 resolved; not resolved: run 0 \(.* %\), run 1 \(.* %\)\.", found)
+    assert all(text.startswith("Not resolved: with half the step") for text in done.data.check.values)
 
 
-def test_a_3d_worm_is_checked_in_step_and_mesh(tmp_path: Path) -> None:
-    of = study([{"field": "arena.friction", "values": [0.5]}], preset="riddle2023-rods", set={"duration_s": 0.1})
-    done = swept(of, tmp_path, check=1)
-    assert [one.name for one in done.checks[0].refinements] == ["half_step", "more_elements"]
-    assert checked_sentence(done).startswith("Checked 1 of 1 runs at half the step and with one more element a side: ")
-
-
-def test_a_run_that_cannot_be_checked_is_refused_before_anything_runs(tmp_path: Path) -> None:
-    steps = [{"field": "clock.physics_timestep_s", "values": [0.005, 0.004]}]
-    of = study(steps, preset="riddle2023-rods", set={"record.signals_interval_s": 0.02})
+def test_what_cannot_be_checked_is_refused_before_anything_runs(tmp_path: Path) -> None:
+    of = study(ONE, preset="riddle2023-rods", set={"clock.physics_timestep_s": 0.005})
     with pytest.raises(ConfigError, match=r"0\.005: half of it is no multiple .* set it to 0\.004 or 0\.006"):
         swept(of, tmp_path / "out", check=1)
     with pytest.raises(ConfigError, match="check = -1: must be at least 0"):

@@ -62,7 +62,7 @@ def test_a_checked_sweep_says_what_is_resolved_in_words_and_in_json(annelid: Com
     words = ("sweep", "study.toml", "-o", "out", "--jobs", "1", "--check", "2")
     done = annelid(*words)
     assert done.exit_code == 0, done.err
-    assert done.out.splitlines()[-4] == "Checked 2 of 4 runs at half the step: all resolved."
+    assert done.out.splitlines()[-4] == "Checked 2 of 4 runs: all resolved."
     assert "Checked" not in annelid(*words, "--quiet").out
     results = json.loads(annelid(*words, "--json").out)["results"]
     assert [row["check"] for row in results["sweep.csv"]] == ["resolved", None, None, "resolved"]

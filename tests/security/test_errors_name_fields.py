@@ -9,7 +9,6 @@ from itertools import product
 from typing import Any, Literal, get_args, get_origin
 
 import pytest
-from pydantic.fields import FieldInfo
 
 from annelid.config import RunConfig, Section, load_config, parse_assignments
 from annelid.config.checking import field_paths, sections_in
@@ -33,28 +32,21 @@ def literals(annotation: Any) -> bool:
 
 
 def fields(
-    section: type[Section] = RunConfig, above: tuple[str, ...] = ()
+    section: type[Section], above: tuple[str, ...], kinds: dict[str, str]
 ) -> Iterator[tuple[str, dict[str, str], Any]]:
     """Every field of every kind: its path, the kinds that make it exist, and its annotation."""
-    for path, kinds, info in _fields(section, above, {}):
-        yield path, kinds, info.annotation
-
-
-def _fields(
-    section: type[Section], above: tuple[str, ...], kinds: dict[str, str]
-) -> Iterator[tuple[str, dict[str, str], FieldInfo]]:
     for name, info in section.model_fields.items():
         inner = kinds_of(info.annotation)
         for each in inner:
             path = (*above, name)
             tag = each.model_fields["kind"].default if "kind" in each.model_fields else None
             chosen = {**kinds, f"{'.'.join(path)}.kind": tag} if tag is not None else kinds
-            yield from _fields(each, path, chosen)
+            yield from fields(each, path, chosen)
         if not inner and name != "kind":
-            yield ".".join((*above, name)), kinds, info
+            yield ".".join((*above, name)), kinds, info.annotation
 
 
-CASES = list(fields())
+CASES = list(fields(RunConfig, (), {}))
 
 
 def wrong(annotation: Any) -> list[Any]:

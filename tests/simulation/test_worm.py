@@ -106,8 +106,9 @@ def test_the_guard_names_the_quantity_that_ran_away(limit: str, words: str) -> N
     assert any(alarm and words in alarm and limit in alarm for alarm in alarms)
 
 
-def test_the_soft_pins_part_and_the_guard_watches_them() -> None:
-    plant = WormPlant(config("soft chain", **{"guard.pin_gap_m": 0.002}))
+def test_the_soft_pins_part_and_the_guard_watches_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("annelid.simulation.worm.MOST_GAP_M", 0.002)
+    plant = WormPlant(config("soft chain"))
     plant.reset(0)
     advance(plant, np.ones(3), 0.2)
     alarm = plant.alarm()

@@ -59,8 +59,8 @@ def plant_of(show: Show) -> WormPlant:
 def ask(show: Show, page: Page, *call: object) -> None:
     """Has the loop do something, and waits until it has."""
     done: list[bool] = []
-    show.ask(*call)  # type: ignore[arg-type]
-    show.ask(done.append, True)
+    show.request(*call)  # type: ignore[arg-type]
+    show.request(done.append, True)
     wait_for(lambda: done, page)
 
 
@@ -143,7 +143,7 @@ def test_a_clip_is_recorded_and_saved(live: tuple[Show, Page], tmp_path: Path) -
 def test_scrubbing_shows_the_past_and_now_the_present(live: tuple[Show, Page]) -> None:
     show, page = live
     slider(page, "time (s)").press("Home")
-    wait_for(lambda: show.player.moment.time_s == show.player.reel.span_s[0], page)
+    wait_for(lambda: show.player.moment.time_s == show.player.history.span_s[0], page)
     assert not show.player.playing
     page.get_by_role("button", name="Live").click()
     wait_for(lambda: show.player.at_end and show.player.playing, page)

@@ -14,11 +14,12 @@ from hypothesis import strategies as st
 from annelid.config import load_config, preset_names
 from annelid.draw.scene import Skeleton
 from annelid.errors import ConfigError, RunFileError
-from annelid.live.living import LivingWorm, Moment, Reel, knobs_of, reel_of
+from annelid.live.history import History, Moment, history_of
+from annelid.live.live_worm import LiveWorm, knobs_of
 from annelid.live.panel import MOST_SAMPLES, plots_of
-from annelid.live.picture import REACH_M, Painter, struck
+from annelid.live.picture import REACH_M, Painter, hit_point
 from annelid.live.player import Player, player_of
-from annelid.live.things import triangles
+from annelid.live.scene_geoms import triangles
 from annelid.simulation.runfile import Run
 from annelid.simulation.worm import compile_worm
 from annelid_lab.logs import LogMap, read_measured
@@ -28,9 +29,9 @@ from annelid_lab.logs.report import measured_plots
 FRAME_S = 0.04
 
 
-def reel(n: int) -> Reel:
+def history(n: int) -> History:
     """Moments every 40 ms whose posture is their number."""
-    made = Reel(["contraction_1", "activation_1"])
+    made = History(["contraction_1", "activation_1"])
     for i in range(n):
         made.add(Moment(i * FRAME_S, np.full(3, i), np.zeros(1), np.zeros((1, 3))))
         made.add_sample(i * FRAME_S, np.array([i, -i], dtype=float))
@@ -69,13 +70,13 @@ def test_a_picture_has_every_part() -> None:
 
 @given(time=st.floats(-1.0, 5.0))
 def test_the_moment_shown_is_the_last_one_before(time: float) -> None:
-    shown = reel(50).at(time).time_s
+    shown = history(50).at(time).time_s
     assert shown == 0.0 if time < 0 else shown <= time + 1e-9 < shown + FRAME_S + 1e-8 or shown == 49 * FRAME_S
 
 
 @given(first=st.floats(0, 2), length=st.floats(0, 2), most=st.integers(2, 60))
 def test_a_window_of_signals_is_thinned_evenly(first: float, length: float, most: int) -> None:
-    times, values = reel(50).window(first, first + length, most)
+    times, values = history(50).window(first, first + length, most)
     assert len(times) <= most + 1
     assert ((times >= first) & (times <= first + length + 1e-6)).all()
     np.testing.assert_allclose(values[:, 0] * FRAME_S, times)
@@ -83,21 +84,17 @@ def test_a_window_of_signals_is_thinned_evenly(first: float, length: float, most
 
 
 def test_the_oldest_is_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("annelid.live.living.KEEP_S", 1.0)
-    grown = reel(0)
-    for i in range(500):
-        grown.add(Moment(i * FRAME_S, np.zeros(3), np.zeros(1), np.zeros((1, 3))))
-        grown.add_sample(i * FRAME_S, np.zeros(2))
-        grown.forget()
+    monkeypatch.setattr("annelid.live.history.MOST_MOMENTS", 500)
+    grown = history(2000)
     first, last = grown.span_s
-    assert last == pytest.approx(499 * FRAME_S)
-    assert 1.0 <= last - first < 1.0 + 80 * FRAME_S
+    assert last == pytest.approx(1999 * FRAME_S)
+    assert 500 * FRAME_S <= last - first <= 1500 * FRAME_S
     assert grown.window(0.0, last, 10_000)[0][0] >= first
 
 
 @given(ticks=st.lists(st.floats(0.0, 0.2), max_size=30), speed=st.floats(0.1, 10))
 def test_a_run_plays_at_its_speed_and_stops_at_its_end(ticks: list[float], speed: float) -> None:
-    player = Player(reel(50), speed)
+    player = Player(history(50), speed)
     for elapsed in ticks:
         player.tick(elapsed)
     passed = speed * sum(ticks)
@@ -110,7 +107,7 @@ def test_a_run_plays_at_its_speed_and_stops_at_its_end(ticks: list[float], speed
 
 
 def test_pause_seek_play_and_restart() -> None:
-    player = Player(reel(50))
+    player = Player(history(50))
     player.tick(0.5)
     player.pause()
     player.tick(5.0)
@@ -145,7 +142,7 @@ def test_a_living_worm_keeps_pace_and_can_be_looked_back_on() -> None:
     player.tick(0.05)
     assert player.moment.time_s > present.time_s
     player.restart()
-    assert (player.moment.time_s, player.reel.span_s) == (0.0, (0.0, 0.0))
+    assert (player.moment.time_s, player.history.span_s) == (0.0, (0.0, 0.0))
 
 
 def test_a_worm_that_blows_up_says_so_and_can_start_anew() -> None:
@@ -162,7 +159,7 @@ def test_a_worm_that_blows_up_says_so_and_can_start_anew() -> None:
 
 
 def test_a_turned_knob_changes_the_model_and_a_bad_value_changes_nothing() -> None:
-    worm = LivingWorm(load_config("riddle2023-rods"))
+    worm = LiveWorm(load_config("riddle2023-rods"))
     worm.advance(0.1, math.inf)
     worm.adjust({"arena.friction": 0.25})
     model = worm.plant.model
@@ -172,13 +169,13 @@ def test_a_turned_knob_changes_the_model_and_a_bad_value_changes_nothing() -> No
         worm.adjust({"arena.friction": -1.0})
     assert worm.config.arena is not None
     assert worm.config.arena.friction == 0.25
-    worm.as_at_first()
+    worm.reset_fields()
     assert set(model.geom_friction[touching, 0]) == {1.0}
     assert worm.time_s == pytest.approx(0.1)
 
 
 def test_a_poke_pushes_and_ends() -> None:
-    worm, left_alone = (LivingWorm(load_config("riddle2023-rods")) for _ in range(2))
+    worm, left_alone = (LiveWorm(load_config("riddle2023-rods")) for _ in range(2))
     place = worm.plant.geometry.crossings_m[20]
     worm.poke(place, np.array([0.0, 3.0, 0.0]))
     for each in (worm, left_alone):
@@ -192,11 +189,11 @@ def test_a_poke_pushes_and_ends() -> None:
 def test_what_a_click_hits() -> None:
     points = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.5, 0.5, 0.0]])
     sight = np.array([1.0, 0.0, 0.0])
-    near = struck(points, np.array([-1.0, 0.5 * REACH_M, 0.0]), sight)
+    near = hit_point(points, np.array([-1.0, 0.5 * REACH_M, 0.0]), sight)
     assert near is not None
     np.testing.assert_array_equal(near, points[0])
-    assert struck(points, np.array([-1.0, 0.25, 0.0]), sight) is None
-    assert struck(points, np.array([2.0, 0.0, 0.0]), sight) is None
+    assert hit_point(points, np.array([-1.0, 0.25, 0.0]), sight) is None
+    assert hit_point(points, np.array([2.0, 0.0, 0.0]), sight) is None
 
 
 def test_every_knob_begins_inside_its_range_and_its_ends_are_allowed(subtests: pytest.Subtests) -> None:
@@ -249,14 +246,14 @@ def test_a_log_is_drawn_beside_the_run_that_it_was_aligned_with(planar_run: Run,
 
 def test_a_run_is_read_as_it_was_recorded(rods_run: Run) -> None:
     n = rods_run.data.sizes["coordinate"]
-    recorded = reel_of(rods_run, n)
+    recorded = history_of(rods_run, n)
     times = rods_run.data["frame_time"].values
     assert [recorded.at(time).time_s for time in times] == times.tolist()
     np.testing.assert_array_equal(recorded.at(0.12).qpos, rods_run.data["qpos"].sel(frame=3).values)
     _, values = recorded.window(0.0, 1.0, 1000)
     np.testing.assert_array_equal(values[:, :12], rods_run.data["potential"].values)
     with pytest.raises(RunFileError, match="another version"):
-        reel_of(rods_run, n + 1)
+        history_of(rods_run, n + 1)
 
 
 @pytest.mark.parametrize(
@@ -306,12 +303,6 @@ def test_a_ray_is_turned_into_the_axes_of_a_slope() -> None:
         server.stop()
 
 
-def test_planar_worms_are_refused(planar_run: Run) -> None:
-    for source in (planar_run, planar_run.config):
-        with pytest.raises(ConfigError, match="nothing to view in 3D"):
-            player_of(source)
-
-
 def test_names_of_neurons_stay_words_in_the_live_diagram() -> None:
     from annelid.live.network import colors_html, network_html
     from annelid.nervous import Network, Neuron
@@ -331,8 +322,8 @@ def test_the_live_diagram_is_of_the_network_that_is_stepped(preset: str) -> None
     from annelid.draw.figures.network_diagram import network_of
     from annelid.live.panel import neurons_of
 
-    worm = LivingWorm(load_config(preset))
-    neurons = neurons_of(worm.reel.names)
+    worm = LiveWorm(load_config(preset))
+    neurons = neurons_of(worm.history.names)
     network = network_of(worm.config, neurons)
     assert network is not None
     assert list(network.neurons) == neurons

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from annelid.arena.kinds.floor import Floor, Ground
     from annelid.arena.mjcf import ROBOT, names_in, stated_in, validator
     from annelid.arena.mjcf_files import read_mjcf
-    from annelid.arena.surface import Implicit, Level, Nearest, Plane, Surface
+    from annelid.arena.surface import Implicit, Level, Plane, Surface
 
 __all__ = [
     "ROBOT",
@@ -22,7 +22,6 @@ __all__ = [
     "Ground",
     "Implicit",
     "Level",
-    "Nearest",
     "Plane",
     "Surface",
     "names_in",
@@ -30,4 +29,4 @@ __all__ = [
     "stated_in",
     "validator",
 ]
-__getattr__, __dir__ = lazy(__name__)
+__getattr__, __dir__ = lazy(__name__, gone={"Nearest": "use Surface"})

@@ -16,7 +16,8 @@ import mujoco
 import numpy as np
 
 from annelid.arena.surface import Shape
-from annelid.config.run import ArenaKind, Walls
+from annelid.config.answers import Walls
+from annelid.config.run import ArenaKind
 from annelid.errors import ConfigError, shortened
 from annelid.morphology import Array, MeshGeometry
 
@@ -56,7 +57,7 @@ def skin_options(arena: ArenaKind, geometry: MeshGeometry, relative: list[float]
     return [contact_options(arena, float(share)) for share in geometry.along(relative, x_m)]
 
 
-def touching(spec: mujoco.MjSpec) -> list[mujoco.MjsGeom]:
+def skin_geoms(spec: mujoco.MjSpec) -> list[mujoco.MjsGeom]:
     """Returns the geoms of the skin that can touch the ground, in the order of the spec, each with a name."""
     skin = [geom for geom in spec.geoms if geom.conaffinity and not geom.contype]
     for number, geom in enumerate(skin):
@@ -68,7 +69,7 @@ def add_moving_planes(spec: mujoco.MjSpec, arena: ArenaKind) -> None:
     """Adds to a worm's spec one plane on a mocap body for every geom that can touch the ground, and pairs the two."""
     options = contact_options(arena)
     del options["friction"], options["priority"]
-    for geom in touching(spec):
+    for geom in skin_geoms(spec):
         name = f"ground_of_{geom.name}"
         holder = spec.worldbody.add_body(name=name, mocap=True)
         holder.add_geom(
@@ -184,7 +185,7 @@ def add_scene(spec: mujoco.MjSpec, text: str, depth_m: float) -> None:
             continue
         moves = alone.body_weldid[alone.geom_bodyid[alone.geom(geom.name).id]] > 0
         geom.rgba = POST_RGBA if moves else GROUND_RGBA
-    for geom in touching(spec):
+    for geom in skin_geoms(spec):
         # Skin with a friction of its own keeps it.
         geom.priority = geom.priority or -1
     spec.attach(scene, prefix=SCENE, frame=spec.worldbody.add_frame(pos=[0.0, 0.0, -depth_m]))

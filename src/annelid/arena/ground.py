@@ -6,7 +6,7 @@ from math import cos, sin
 
 import numpy as np
 
-from annelid.arena.surface import Between, Plane, Round, Surface
+from annelid.arena.surface import FreeSpace, Plane, RoundPost, Surface
 from annelid.config.run import ArenaKind
 from annelid.protocols import Array
 
@@ -16,8 +16,8 @@ def surface_of(arena: ArenaKind) -> Surface:
     gap_m, posts = arena.walls
     side = np.array([0.0, 1.0, 0.0])
     rails = () if gap_m is None else (Plane(side, -gap_m / 2), Plane(-side, -gap_m / 2))
-    walls = (*rails, *(Round(np.array([x, y]), radius) for x, y, radius in posts))
-    return Between((arena.ground(), *walls)) if walls else arena.ground()
+    walls = (*rails, *(RoundPost(np.array([x, y]), radius) for x, y, radius in posts))
+    return FreeSpace((arena.ground(), *walls)) if walls else arena.ground()
 
 
 def gravity_of(arena: ArenaKind) -> Array:

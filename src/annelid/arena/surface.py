@@ -59,10 +59,6 @@ class Surface(ABC):
         return self.nearest(points_m)[1]
 
 
-Nearest = Surface
-"""The name of `Surface` as a base class in annelid 0.1."""
-
-
 @dataclass(frozen=True)
 class Plane(Surface):
     """An even surface, with its unit normal, ``(3,)``, and its distance from the origin along that, m."""
@@ -76,7 +72,7 @@ class Plane(Surface):
 
 
 @dataclass(frozen=True)
-class Round(Surface):
+class RoundPost(Surface):
     """An upright post without an upper end."""
 
     axis_m: Array  # x and y, (2,)
@@ -91,8 +87,8 @@ class Round(Surface):
 
 
 @dataclass(frozen=True)
-class Between(Surface):
-    """Free space within several surfaces, as a floor, two rails and posts."""
+class FreeSpace(Surface):
+    """The boundary of the space between several surfaces, as a floor, two rails and posts."""
 
     parts: tuple[Surface, ...]
 

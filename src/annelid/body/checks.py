@@ -11,7 +11,8 @@ from statistics import fmean
 
 from annelid.body.estimates import rhombus_of, softened
 from annelid.body.mesh import MeshBody
-from annelid.config.run import Finding, RunConfig
+from annelid.config.answers import Finding
+from annelid.config.run import RunConfig
 
 
 def mesh_findings(body: MeshBody) -> Iterator[Finding]:

@@ -19,7 +19,7 @@ from collections.abc import Iterator
 from math import cos, hypot, tan
 
 from annelid.body.mesh import MeshBody
-from annelid.config.run import Finding
+from annelid.config.answers import Finding
 from annelid.morphology import Rhombus, rhombus
 
 HARDLY = 0.02

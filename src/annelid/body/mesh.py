@@ -7,7 +7,8 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, field_validator
 
-from annelid.config.run import BodyKind, Elements
+from annelid.config.answers import Elements
+from annelid.config.run import BodyKind
 from annelid.config.sections import Length, Modulus, NonNegative, PerSegmentOf, Positive, Section
 from annelid.morphology import MeshGeometry, helical_mesh
 

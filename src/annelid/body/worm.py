@@ -15,8 +15,9 @@ from annelid.body.checks import ground_findings, material_findings, mesh_finding
 from annelid.body.estimates import rhombus_of
 from annelid.body.formulations import FormulationKind
 from annelid.body.mesh import MeshBody
+from annelid.config.answers import Finding
 from annelid.config.kinds import Choice, default_of
-from annelid.config.run import Finding, RunConfig
+from annelid.config.run import RunConfig
 from annelid.config.sections import Section
 from annelid.errors import ConfigError, listed, shown
 from annelid.protocols import Plant

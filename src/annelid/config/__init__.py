@@ -8,6 +8,7 @@ overridden by its dotted path (``body.mesh.n_segments=4``). A level of `fidelity
 
 from __future__ import annotations
 
+from annelid.config.answers import Elements, Finding, OwnModel
 from annelid.config.checking import (
     CONSTANT,
     REPLACED,
@@ -33,7 +34,7 @@ from annelid.config.loading import (
     preset_names,
     preset_text,
 )
-from annelid.config.run import ArenaKind, BodyKind, ControllerKind, Elements, Finding, OwnModel, RunConfig, TurningKind
+from annelid.config.run import ArenaKind, BodyKind, ControllerKind, RunConfig, TurningKind
 from annelid.config.sections import Length, Line, NonNegative, Positive, Section, Share
 from annelid.config.settings import Clock, Guard, Record, StretchSensor
 from annelid.config.study import Study, Vary, load_study

@@ -114,6 +114,9 @@ REPLACED = {
     "arena.friction_cone": "rods always have elliptic cones, and a chain pyramidal ones",
     "body.formulation.solver_iterations": "the solver's limits are constants of the formulation",
     "body.formulation.solver_tolerance": "the solver's limits are constants of the formulation",
+    "guard.pin_gap_m": "the two strands of a crossing may always part by 15 cm",
+    "guard.ring_closure": "a ring may always be as short as its crossings are wide",
+    "guard.stretch": "an axial spring may always be 1.1 times as long as the straight strands beside it",
     "controller.landing": "it saved nothing (sns-pressure)",
     "controller.let_go_s": "it is controller.motor_time_constant_s",
     "controller.drive_slope_per_s": "the drive of 'adaptive' is constant during a run",
@@ -132,6 +135,9 @@ REPLACED = {
 }
 """What replaced fields that older files have, by their dotted paths."""
 CONSTANT = {
+    "guard.pin_gap_m": 0.15,
+    "guard.ring_closure": 1.0,
+    "guard.stretch": 1.1,
     "controller.capacitance_nF": 5.0,
     "controller.leak_conductance_uS": 1.0,
     "controller.range_mV": 20.0,

@@ -22,8 +22,6 @@ from annelid.textfiles import check_depth, parse_toml, read_toml, toml_value
 DEFAULT_BASE = "riddle2023-rods"
 """What a user's file starts from unless it says otherwise or states its own kind of body."""
 
-MOST_EXTENDED = 50
-"""Files of which each extends the next."""
 _packages = ["annelid"]
 """Packages that have presets and arenas."""
 
@@ -237,8 +235,6 @@ def _layers(
         own.setdefault("name", path.stem)
         if path.resolve() in above:
             raise ConfigError(f"{path} extends itself: {listed(each.name for each in (*above, path))}")
-        if len(above) >= MOST_EXTENDED:
-            raise ConfigError(f"{path}: more than {MOST_EXTENDED} files extend one another")
         above = (*above, path.resolve())
         body = own.get("body")
         stands_alone = isinstance(body, Mapping) and "kind" in body

@@ -7,15 +7,15 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from functools import cache
 from importlib import resources
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
+from annelid.config.answers import Elements, Finding, Goals, OwnModel, Walls
 from annelid.config.kinds import Choice, Kind, default_of, kinds_of
-from annelid.config.sections import Impedance, Line, NonNegative, Positive, Section, Seed, Share
+from annelid.config.sections import Friction, Impedance, Line, NonNegative, Positive, Section, Seed, Share
 from annelid.config.settings import Clock, Contraction, Guard, Record, StretchSensor, is_multiple
 from annelid.errors import ConfigError, listed
 from annelid.registry import Registry
@@ -30,10 +30,6 @@ if TYPE_CHECKING:
     from annelid.protocols import Array, Controller, Plant, Steering, Values
 
 MOST_SAMPLES = 10_000_000
-Friction = Annotated[float, Field(ge=0.01, le=100)]
-Place = Annotated[float, Field(ge=-1e4, le=1e4)]
-Post = tuple[Place, Place, Annotated[float, Field(gt=0, le=100)]]
-"""Of an upright round post: x, y and radius, m."""
 
 
 @cache
@@ -58,42 +54,6 @@ class Checked:
         Raises:
             ValueError: They do not fit; the message names the fields, the value and what is valid.
         """
-
-
-class Goals(NamedTuple):
-    """Places on the ground that a worm is steered to.
-
-    Attributes:
-        points_m: x and y of each, m.
-        reach_m: Distance at which one counts as reached, m.
-    """
-
-    points_m: tuple[tuple[float, float], ...] = ()
-    reach_m: float = 0.0
-
-
-class OwnModel(NamedTuple):
-    """A robot that a file describes whole.
-
-    Attributes:
-        xml: The robot and its ground as MJCF.
-        actuators: Names of the actuators of its segments, segment by segment.
-    """
-
-    xml: str
-    actuators: tuple[str, ...]
-
-
-class Walls(NamedTuple):
-    """What stands upright on a ground.
-
-    Attributes:
-        rail_gap_m: Distance of two guard rails along x, the worm midway, m; None for none.
-        posts: x, y and radius of upright round posts, m.
-    """
-
-    rail_gap_m: float | None = None
-    posts: tuple[Post, ...] = ()
 
 
 class ControllerKind(Checked, Kind):
@@ -155,49 +115,6 @@ class TurningKind(Checked, Kind):
             n_segments: Segments of the worm.
             control_timestep_s: Control step, s.
         """
-
-
-class Elements(NamedTuple):
-    """How finely a body is divided.
-
-    Attributes:
-        field: Dotted path of the field that says it.
-        number: Its value.
-        most: The greatest that is allowed.
-    """
-
-    field: str
-    number: int
-    most: int
-
-
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """Something wrong with a configuration.
-
-    Attributes:
-        field: Dotted path of the field to change.
-        value: Its value.
-        problem: What is wrong, in a sentence without a full stop.
-        instead: What to set instead, with a number.
-        severity: "error" where the run can mean nothing and is refused, "warning" where it is doubtful.
-    """
-
-    field: str
-    value: object
-    problem: str
-    instead: str
-    severity: Literal["error", "warning"] = "warning"
-
-    def __str__(self) -> str:
-        """Returns one sentence."""
-        return f"{self.field} = {_text(self.value)}: {self.problem}; {self.instead}"
-
-
-def _text(value: object) -> str:
-    if isinstance(value, list):
-        return f"[{', '.join(map(_text, value))}]"
-    return f"{value:g}" if isinstance(value, int | float) else str(value)
 
 
 class BodyKind(Checked, Kind):

@@ -22,6 +22,7 @@ Line = Annotated[str, AfterValidator(_line)]
 Positive = Annotated[float, Field(gt=0, le=1e15)]
 NonNegative = Annotated[float, Field(ge=0, le=1e15)]
 Share = Annotated[float, Field(ge=0, le=1)]
+Friction = Annotated[float, Field(ge=0.01, le=100)]
 Level = Annotated[float, Field(gt=0, le=1)]
 """Of an activation that is not nothing."""
 Length = Annotated[float, Field(ge=1e-6, le=1e3)]

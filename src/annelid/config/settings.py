@@ -60,15 +60,7 @@ class Guard(Section):
         default=1.0, description="of any crossing above the ground (in a scene: its z = 0), or off a pipe's wall"
     )
     edge_strain: Positive = Field(default=0.05, description="of any edge of a rod")
-    pin_gap_m: Positive = Field(default=0.15, description="between the two strands of a pinned crossing")
     depth_m: Positive = Field(default=0.05, description="of any vertex below the ground, or outside a pipe's wall")
-    stretch: Positive = Field(
-        default=1.1, description="of any axial spring, over the length at which the strands beside it are straight"
-    )
-    ring_closure: NonNegative = Field(
-        default=1.0,
-        description="least length of any ring, over that at which the strands of neighbouring crossings touch; 0: none",
-    )
 
 
 class Contraction(Section):

@@ -15,7 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
 
 from annelid.clock import SLACK_S
-from annelid.config.run import Goals, RunConfig, TurningKind
+from annelid.config.answers import Goals
+from annelid.config.run import RunConfig, TurningKind
 from annelid.config.sections import Level, NonNegative, Positive
 from annelid.control.base import SavedWrapper, TimeConstant
 from annelid.control.circuit import heading_angle

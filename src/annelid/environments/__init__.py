@@ -17,7 +17,7 @@ from annelid.errors import MissingDependency
 from annelid.lazy import lazy
 
 if TYPE_CHECKING:
-    from annelid.environments.episode import Layout
+    from annelid.environments.observation import Layout
     from annelid.environments.single import WormEnv
     from annelid.environments.task import Weights
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -91,26 +91,26 @@ def task_of(
     return Task(config, moves, steps, checked, float(start_activation), goal_m)
 
 
-class Deed(NamedTuple):
-    """What a worm has done in one step of the environment."""
+def reward_terms(
+    weights: Weights, speed: float, slip_speed: float, action: Array, *, passed: bool, broke_down: bool
+) -> dict[str, float]:
+    """Returns the terms of a step's reward by name, whose sum it is.
 
-    advance_m: float  # how far its middle has come along its route
-    slid_m: float  # mean path that its segments have slid on the ground
-    action: Array  # the activations that it was given, (n_muscles,)
-    passed: bool  # whether it has come through its pipe in this step
-    broke_down: bool  # whether its simulation broke down; then nothing else counts
-
-
-def reward_terms(deed: Deed, weights: Weights, length_m: float, interval_s: float) -> dict[str, float]:
-    """Returns the terms of a step's reward by name, whose sum it is; for a body of a length and a step of a time."""
-    lengths_per_s = 0.0 if deed.broke_down else 1.0 / (length_m * interval_s)
-    effort = 0.0 if deed.broke_down else float(np.mean(deed.action * deed.action))
+    Args:
+        weights: What they are multiplied by.
+        speed: Of the worm's middle along its route, body lengths a second.
+        slip_speed: At which its segments slid on the ground, in the mean, body lengths a second.
+        action: The activations that it was given, ``(n_muscles,)``.
+        passed: Whether it has come through its pipe in this step.
+        broke_down: Whether its simulation broke down; then nothing else counts.
+    """
+    moved = 0.0 if broke_down else 1.0
     return {
-        "reward_progress": weights.progress * deed.advance_m * lengths_per_s,
-        "reward_effort": 0.0 - weights.effort * effort,
-        "reward_slip": 0.0 - weights.slip * deed.slid_m * lengths_per_s,
-        "reward_success": weights.success * float(deed.passed),
-        "reward_failure": 0.0 - weights.failure * float(deed.broke_down),
+        "reward_progress": weights.progress * moved * speed,
+        "reward_effort": 0.0 - weights.effort * moved * float(np.mean(action * action)),
+        "reward_slip": 0.0 - weights.slip * moved * slip_speed,
+        "reward_success": weights.success * float(passed),
+        "reward_failure": 0.0 - weights.failure * float(broke_down),
     }
 
 

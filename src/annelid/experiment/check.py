@@ -117,21 +117,26 @@ class Check:
             return ""
         return percent(self.largest(name)) + ("\nnot resolved" if self.largest(name) > RESOLVED else "")
 
+    def _named(self, name: str) -> str:
+        return f"{NUMBERS[name].label} {percent(self.largest(name))}"
+
+    @property
+    def brief(self) -> str:
+        """Says in a few words what keeps the run from being resolved: another order, or the number that moves most."""
+        return self.differences[0] if self.differences else "" if self.worst is None else self._named(self.worst)
+
     @property
     def sentence(self) -> str:
         """Says in plain words what the check has found."""
         finer = " and ".join(one.words for one in self.refinements)
         further = f" {self.left_out}" if self.left_out else ""
-
-        def named(name: str) -> str:
-            return f"{NUMBERS[name].label} ({percent(self.largest(name))})"
-
         if self.resolved:
-            most = "" if self.worst is None else f"; most of all moves {named(self.worst)}"
+            most = "" if self.worst is None else f"; most of all moves {self._named(self.worst)}"
             return f"Resolved: with {finer} no number moves by more than {percent(RESOLVED)}{most}.{further}"
         faults = [*self.differences]
         if self.unresolved:
-            faults.append(f"these numbers move by more than {percent(RESOLVED)}: {listed(map(named, self.unresolved))}")
+            named = listed(map(self._named, self.unresolved))
+            faults.append(f"these numbers move by more than {percent(RESOLVED)}: {named}")
         # A finer step costs less than a finer mesh, so that it comes first where both help.
         by_step = not self.unresolved or any(self.moved[name].get(HALF, 0.0) > RESOLVED for name in self.unresolved)
         try_this = self.refinements[0 if by_step else -1]

@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import exp, floor, log
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -52,6 +52,7 @@ class Choice:
 
 
 Variable = Interval | Choice
+T = TypeVar("T")
 
 
 def variables_of(varied: Sequence[Vary], base: RunConfig) -> list[Variable]:
@@ -117,3 +118,9 @@ def unit_samples(design: Design, n: int, n_variables: int, seed: int) -> Array:
         # That any number but a power of two is less even: the user may add samples later.
         warnings.simplefilter("ignore", UserWarning)
         return np.minimum(engine.random(n), np.nextafter(1.0, 0.0))
+
+
+def spread_evenly(n: int, items: Sequence[T]) -> list[T]:
+    """Returns n of a sequence's items, evenly picked from the first to the last of them; all where there are fewer."""
+    places = np.linspace(0, len(items) - 1, min(n, len(items)))
+    return [items[round(place)] for place in places.tolist()]

@@ -7,12 +7,12 @@ runs.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib.metadata import version
-from itertools import product, zip_longest
+from itertools import product
 from math import prod
 from pathlib import Path
 from typing import Any
@@ -22,27 +22,18 @@ import xarray as xr
 from rich.table import Table
 
 from annelid.analysis import NUMBERS, Number
-from annelid.config import (
-    RunConfig,
-    Study,
-    Vary,
-    field_paths,
-    load_config,
-    load_study,
-    toml_value,
-    unit_of,
-)
+from annelid.config import RunConfig, Study, Vary, field_paths, load_config, load_study, toml_value, unit_of
 from annelid.config.study import INSTEAD, MOST_RUNS
 from annelid.draw.figures.sweep import sweep_figure, worded
-from annelid.errors import ConfigError, shown
+from annelid.errors import ConfigError, shown, suggest
 from annelid.experiment.case import Case
-from annelid.experiment.check import MORE, Check, check_runs, percent, refinements
+from annelid.experiment.check import Check, check_runs, refinements
 from annelid.experiment.executors import workers
-from annelid.experiment.numbers import PREFERRED, chosen_numbers
 from annelid.experiment.progress import StudyProgress
-from annelid.experiment.space import Choice, Variable, from_unit, sampled, unit_samples, variables_of
+from annelid.experiment.space import Choice, Variable, from_unit, sampled, spread_evenly, unit_samples, variables_of
 from annelid.experiment.store import Done, Store
 from annelid.output import whole_file, write_csv
+from annelid.protocols import Array
 from annelid.simulation.lock import locks
 
 __all__ = ["Sweep", "sweep"]
@@ -51,10 +42,21 @@ SAMPLE, REPEAT, SEGMENT = "sample", "repeat", "segment"
 """Dimensions beside those of the varied fields."""
 RUNS, DATASET, ROWS, FIGURE = "runs", "sweep.nc", "sweep.csv", "sweep"
 """What is in the folder of the results."""
+PREFERRED = ("speed_m_per_s", "cost_of_transport", "slip_ratio", "period_s", "travel_m", "elongation_mean_max_m")
+"""What a table and a figure show first unless the study says otherwise."""
 N_SHOWN = 4
 """Numbers in the table and panels in the figure."""
 N_ENDS, N_FAILED = 3, 8
 """Rows of the table: from either end, and of reasons."""
+WORDS = {
+    "status": "complete, stopped by a guard, or failed",
+    "reason": "why a run is not complete",
+    "rhythm": "verdict on the rhythm",
+    "warnings": "what is doubtful about a run",
+    "check": "resolved, or what moves at half the step or with one more element a side",
+    "run": "folder of the run",
+}
+"""What is said of each run beside its numbers."""
 LONG_S = 100 * 3600.0
 """Studies that take longer on one core begin with a warning, s."""
 
@@ -103,11 +105,37 @@ class Sweep:
     folder: Path
     checks: Mapping[int, Check]
 
-    @property
-    def checked(self) -> list[str]:
-        """What the check says of each run: "resolved" or its sentence; empty where it was not checked."""
-        found = map(self.checks.get, range(len(self.runs)))
-        return ["" if one is None else "resolved" if one.resolved else one.sentence for one in found]
+    @cached_property
+    def words(self) -> list[dict[str, str]]:
+        """What is said of each run, by the names of `WORDS`."""
+        found = []
+        for i, run in enumerate(self.runs):
+            check, outcome = self.checks.get(i), run.outcome
+            found.append(
+                {
+                    "status": run.status,
+                    "reason": run.reason,
+                    "rhythm": "" if outcome is None else outcome.rhythm.verdict or "",
+                    "warnings": " | ".join(run.warnings),
+                    "check": "" if check is None else "resolved" if check.resolved else check.sentence,
+                    "run": "" if outcome is None else outcome.path.name,
+                }
+            )
+        return found
+
+    @cached_property
+    def values(self) -> dict[str, Array]:
+        """The numbers of every run, ``(n_runs, 1)`` or ``(n_runs, n_segments)``, by name; NaN where a run has none."""
+        summaries = [None if run.outcome is None else run.outcome.summary for run in self.runs]
+        n_segments = max((one.n_segments for one in summaries if one is not None), default=0)
+        found = {}
+        for number in self.numbers:
+            table = np.full((len(summaries), n_segments if number.per_segment else 1), np.nan)
+            for row, one in zip(table, summaries, strict=True):
+                if (value := getattr(one, number.name, None)) is not None:
+                    row[: np.size(value)] = np.array(value, dtype=float)
+            found[number.name] = table
+        return found
 
     @cached_property
     def data(self) -> xr.Dataset:
@@ -117,29 +145,19 @@ class Sweep:
         repeats and ``segment`` counts from 1.
         """
         plan, dims = self.plan, tuple(self.plan.levels)
+        levels = dict(plan.levels)
         variables: dict[str, Any] = {}
-        words = {name: (text, [words_of(run) for run in self.runs]) for name, (text, words_of) in _WORDS.items()}
-        words["check"] = ("resolved, or what moves at half the step or with one more element a side", self.checked)
-        for name, (text, of_runs) in words.items():
-            table = np.array(of_runs, dtype=object).reshape(plan.shape)
+        for name, text in WORDS.items():
+            table = np.array([said[name] for said in self.words], dtype=object).reshape(plan.shape)
             variables[name] = (dims, table, {"units": "1", "long_name": text})
-        outcomes = [run.outcome for run in self.runs]
-        read = {
-            number: [None if one is None else getattr(one.summary, number.name) for one in outcomes]
-            for number in self.numbers
-        }
-        lengths = [len(value or ()) for number, values in read.items() if number.per_segment for value in values]
-        n_segments = max(lengths, default=0)
-        for number, values in read.items():
-            below = {SEGMENT: n_segments} if number.per_segment else {}
-            table = np.full((len(values), prod(below.values())), np.nan)
-            for row, value in zip(table, values, strict=True):
-                if value is not None:
-                    row[: np.size(value)] = np.array(value, dtype=float)
-            attrs = {"units": number.unit, "long_name": number.meaning}
-            variables[number.name] = ((*dims, *below), table.reshape(*plan.shape, *below.values()), attrs)
+        for number in self.numbers:
+            table, attrs = self.values[number.name], {"units": number.unit, "long_name": number.meaning}
+            if number.per_segment:
+                levels[SEGMENT] = range(1, table.shape[1] + 1)
+                variables[number.name] = ((*dims, SEGMENT), table.reshape(*plan.shape, -1), attrs)
+            else:
+                variables[number.name] = (dims, table.reshape(plan.shape), attrs)
         counted = {SAMPLE: "number of the sample", REPEAT: "seed of the run", SEGMENT: "segment, from the front"}
-        levels = dict(plan.levels) | ({SEGMENT: range(1, n_segments + 1)} if lengths else {})
         coords: dict[str, Any] = {
             name: (name, np.array(levels[name]), {"units": "1", "long_name": text})
             for name, text in counted.items()
@@ -162,15 +180,6 @@ class Sweep:
                 "n_warned": sum(bool(run.warnings) for run in self.runs),
             },
         )
-
-
-_WORDS: Mapping[str, tuple[str, Callable[[Done], str]]] = {
-    "status": ("complete, stopped by a guard, or failed", lambda run: run.status),
-    "reason": ("why a run is not complete", lambda run: run.reason),
-    "run": ("folder of the run", lambda run: "" if run.outcome is None else run.outcome.path.name),
-    "rhythm": ("verdict on the rhythm", lambda run: "" if run.outcome is None else run.outcome.rhythm.verdict or ""),
-    "warnings": ("what is doubtful about a run, a sentence a line", lambda run: "\n".join(run.warnings)),
-}
 
 
 def _column(values: Sequence[Any]) -> np.ndarray:
@@ -216,8 +225,8 @@ def sweep(
         ``check`` is "resolved" or what moves in finer runs, and empty where a run was not checked.
 
     Raises:
-        ConfigError: The study is refused, or all of its runs are, or one to be checked has a step that is no multiple
-            of twice the control step.
+        ConfigError: The study is refused, or all of its runs are, or the check is: the step is no multiple of twice the
+            control step.
         ClusterError: The workers are lost for good; finished runs are kept.
         RunFileError: A file cannot be written.
         KeyboardInterrupt: Finished runs are kept, and the results if only the check was interrupted.
@@ -244,11 +253,11 @@ def swept(
     """
     numbers = chosen_numbers(study.outputs, study.rank)
     plan = plan_of(study)
+    if check < 0:
+        raise ConfigError(f"check = {check}: must be at least 0")
+    if check:
+        refinements(plan.base)
     cases = [case for _, case in plan.points]
-    refusals = [_refusal(case) if check else None for case in cases]
-    for i in to_check(plan, check, [True] * len(cases)):
-        if (refusal := refusals[i]) is not None:
-            raise refusal
     store = Store(folder / RUNS, executor, study.keep, progress)
     done = store.finish(cases, "sweep")
     if all(one.refused for one in done) and done[0].error is not None:
@@ -257,72 +266,36 @@ def swept(
     if check:
         # Whoever interrupts the check keeps the sweep.
         write_results(found)
-        usable = [one.status == "complete" and no is None for one, no in zip(done, refusals, strict=True)]
-        chosen = to_check(plan, check, usable)
+        chosen = spread_evenly(check, [i for i, one in enumerate(done) if one.status == "complete"])
         found = replace(found, checks=dict(zip(chosen, check_runs(store, [cases[i] for i in chosen]), strict=True)))
     return found
 
 
-def _refusal(case: Case) -> ConfigError | None:
-    """Why a run cannot be checked; None also where it cannot even be built, since that is told as its failure."""
-    try:
-        config = case.config
-    except ConfigError:
-        return None
-    try:
-        refinements(config)
-    except ConfigError as error:
-        return error
-    return None
-
-
-def to_check(plan: Plan, n: int, usable: Sequence[bool]) -> list[int]:
-    """Returns the numbers of n runs, spread evenly over the plan; in place of one that is not usable the nearest is.
-
-    Of runs that differ in their seed only, a second is taken once there is one of all others.
-    """
-    if n < 0:
-        raise ConfigError(f"check = {n}: must be at least 0")
-    cells: dict[str, list[int]] = {}
-    for i, (_, case) in enumerate(plan.points):
-        its = cells.setdefault(repr([item for item in case.changes.items() if item[0] != "seed"]), [])
-        its += [i] if usable[i] else []
-    chosen: list[int] = []
-    for one_each in zip_longest(*cells.values()):
-        free = {at: run for at, run in enumerate(one_each) if run is not None}
-        places = np.linspace(0, len(one_each) - 1, min(n - len(chosen), len(free))).round()
-        chosen += [free.pop(min(free, key=lambda at, place=place: abs(at - place))) for place in places]
-    return sorted(chosen)
+def chosen_numbers(names: Sequence[str], rank: str | None) -> tuple[Number, ...]:
+    """Returns numbers by name, all for none; the one to rank runs by must be among them, and not one per segment."""
+    known = {name: number for name, number in NUMBERS.items() if number.in_sweeps}
+    for name in names:
+        if name not in known:
+            raise ConfigError(f"outputs: unknown number {name!r}: {suggest(name, known)}")
+    chosen = tuple(known[name] for name in dict.fromkeys(names or known))
+    scalars = [number.name for number in chosen if not number.per_segment]
+    if rank is not None and rank not in scalars:
+        raise ConfigError(
+            f"rank = {rank!r}: must be one of the outputs with one number a run: {suggest(rank, scalars)}"
+        )
+    return chosen
 
 
 def checked_sentence(sweep: Sweep) -> str:
     """Says how many of the runs are resolved, and which are not and why."""
     if not sweep.checks:
         return "No run is complete, so none was checked."
-    more = any(one.name == MORE for check in sweep.checks.values() for one in check.refinements)
-    how = f"at half the step{' and with one more element a side' if more else ''}"
-    faults = [f"{_named(sweep, i)} ({_brief(check)})" for i, check in sweep.checks.items() if not check.resolved]
+    faults = [f"run {i} ({check.brief})" for i, check in sweep.checks.items() if not check.resolved]
     n = len(sweep.checks)
-    said = f"Checked {n} of {len(sweep.runs)} runs {how}: {n - len(faults) if faults else 'all'} resolved"
+    counted = f"Checked {n} of {len(sweep.runs)} runs: {n - len(faults) if faults else 'all'} resolved"
     if len(faults) > N_FAILED:
         faults[N_FAILED:] = [f"{len(faults) - N_FAILED} more, which {ROWS} has"]
-    return f"{said}{'; not resolved: ' if faults else ''}{', '.join(faults)}."
-
-
-def _named(sweep: Sweep, i: int) -> str:
-    """Names a run by its varied fields, or by its number where these are many."""
-    fields = [*sweep.plan.fields, "seed"]
-    pairs = zip(fields, _varied(sweep, i), strict=False)
-    return f"run {i}" if len(sweep.plan.fields) > 2 else ", ".join(f"{field} = {value}" for field, value in pairs)
-
-
-def _brief(check: Check) -> str:
-    """What keeps a run from being resolved, in a few words: another order, or the number that moves most."""
-    if check.differences:
-        return check.differences[0]
-    worst, n = max(check.unresolved, key=lambda name: check.largest(name) or 0.0), len(check.unresolved)
-    words = worded(worst, NUMBERS[worst].unit).partition(" (")[0]
-    return f"{words} {percent(check.largest(worst) or 0.0)}{f' and {n - 1} more' if n > 1 else ''}"
+    return f"{counted}{'; not resolved: ' if faults else ''}{', '.join(faults)}."
 
 
 def plan_of(study: Study) -> Plan:
@@ -387,28 +360,22 @@ def write_results(sweep: Sweep) -> list[Path]:
 
 def _write_rows(sweep: Sweep, path: Path) -> Path:
     """Writes one row a run as CSV with a header; what there is per segment has a column for each."""
-    columns: dict[str, np.ndarray] = {}
+    columns: dict[str, Array] = {}
     for number in sweep.numbers:
-        values = sweep.data[number.name].values.reshape(len(sweep.runs), -1)
-        names = [f"{number.name}_{i}" for i in sweep.data[SEGMENT].values] if number.per_segment else [number.name]
-        columns |= dict(zip(names, values.T, strict=True))
-    checked = sweep.checked
+        values = sweep.values[number.name]
+        segments = [f"_{i + 1}" for i in range(values.shape[1])] if number.per_segment else [""]
+        columns |= zip((f"{number.name}{segment}" for segment in segments), values.T, strict=True)
     rows = (
         [
             i,
             *_varied(sweep, i),
-            run.status,
-            run.reason,
-            " | ".join(run.warnings),
-            checked[i],
-            "" if run.outcome is None else run.outcome.path.name,
+            *said.values(),
             *("" if np.isnan(values[i]) else f"{values[i]:.10g}" for values in columns.values()),
         ]
-        for i, run in enumerate(sweep.runs)
+        for i, said in enumerate(sweep.words)
     )
     seed = ["seed"] if REPEAT in sweep.plan.levels else []
-    words = ["status", "reason", "warnings", "check", "run"]
-    return write_csv(path, ["number", *sweep.plan.fields, *seed, *words, *columns], rows)
+    return write_csv(path, ["number", *sweep.plan.fields, *seed, *WORDS, *columns], rows)
 
 
 def shown_numbers(sweep: Sweep) -> list[str]:

@@ -16,13 +16,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from rich.table import Table
 
+from annelid.analysis import NUMBERS
 from annelid.config import RunConfig, Vary, field_value, fields_of, load_config, parse_assignments, toml_value
 from annelid.config.checking import check_section
 from annelid.draw.figures.experiments import pareto_figure, progress_figure
+from annelid.draw.figures.sweep import worded
 from annelid.errors import ConfigError, MissingDependency, suggest
 from annelid.experiment.case import Case, write_worm
 from annelid.experiment.judge import Judged, judge
-from annelid.experiment.space import Choice, Variable, variables_of
+from annelid.experiment.space import Choice, Variable, spread_evenly, variables_of
 from annelid.experiment.store import Done, Store
 from annelid.output import write_csv
 
@@ -32,26 +34,26 @@ if TYPE_CHECKING:
 HOW = "give FIELD=LOW:HIGH, FIELD=LOW:HIGH:log or FIELD=VALUE,VALUE,.."
 HISTORY, BEST, FRONT, FIGURE = "trials.csv", "best.toml", "front", "tuning"
 """What is in the folder of the results."""
-_ROWS = {
-    "speed (m/s)": "speed_m_per_s",
-    "body lengths/s": "speed_body_lengths_per_s",
-    "cost of transport": "cost_of_transport",
-    "the same, net work": "cost_of_transport_net",
-    "the same, cables": "cost_of_transport_cables",
-    "slip ratio": "slip_ratio",
-    "period (s)": "gait_period_s",
-    "cycles": "cycles",
-}
+SHOWN = (
+    "speed_m_per_s",
+    "speed_body_lengths_per_s",
+    "cost_of_transport",
+    "cost_of_transport_net",
+    "cost_of_transport_cables",
+    "slip_ratio",
+    "gait_period_s",
+    "cycles",
+)
+"""Numbers of a gait in its row, in the table and in its file."""
 MOST_SHOWN = 8
 """Gaits of a Pareto front in the table, evenly picked from it."""
 
 
 @dataclass(frozen=True, slots=True)
 class Objective:
-    """A number that a gait is tuned for: the name that a user gives, a label with its unit, and its name in `Gait`."""
+    """A number that a gait is tuned for: the name that a user gives, and its name in `NUMBERS`."""
 
     name: str
-    label: str
     number: str
     more_is_better: bool
     penalty: float
@@ -66,13 +68,18 @@ class Objective:
 OBJECTIVES: Mapping[str, Objective] = {
     one.name: one
     for one in (
-        Objective("speed", "speed (m/s)", "speed_m_per_s", True, 0.0),
-        Objective("cost-of-transport", "cost of transport", "cost_of_transport", False, 100.0),
-        Objective("slip", "slip ratio", "slip_ratio", False, 10.0),
+        Objective("speed", "speed_m_per_s", True, 0.0),
+        Objective("cost-of-transport", "cost_of_transport", False, 100.0),
+        Objective("slip", "slip_ratio", False, 10.0),
     )
 }
 """The objectives. The cost of transport counts positive work, none of it regained. The penalties are worse than any
 gait that advances: no speed, and a cost and a slip beyond reach."""
+
+
+def labelled(name: str) -> str:
+    """Writes the name of a number in words, with its unit in brackets."""
+    return worded(name, NUMBERS[name].unit)
 
 
 def objectives_of(names: list[str]) -> list[Objective]:
@@ -177,7 +184,7 @@ class Trial:
     @property
     def numbers(self) -> list[str]:
         """The numbers of its gait, each empty where there is none."""
-        found = (getattr(self.judged.gait, name, None) for name in _ROWS.values())
+        found = (getattr(self.judged.gait, name, None) for name in SHOWN)
         return ["" if number is None else f"{number:.4g}" for number in found]
 
     def settings(self, task: Task) -> list[str]:
@@ -328,7 +335,7 @@ def write_results(task: Task, trials: Sequence[Trial], command: str, folder: Pat
     """
     folder.mkdir(parents=True, exist_ok=True)
     rows = ([one.name, *one.settings(task), *one.numbers, one.judged.problem, one.path.name] for one in trials)
-    columns = ["trial", *(one.field for one in task.variables), *_ROWS.values(), "problem", "run"]
+    columns = ["trial", *(one.field for one in task.variables), *SHOWN, "problem", "run"]
     written = [write_csv(folder / HISTORY, columns, rows), _figure(task, trials, folder / FIGURE)]
     best = leader(trials, task.objectives)
     if best is not None:
@@ -348,7 +355,7 @@ def write_gait(task: Task, trial: Trial, command: str, path: Path) -> Path:
     lines = [
         f"Tuned by: {command} ({task.n_trials} trials, seed {task.seed})",
         f"Trial {trial.name}:",
-        *(f"  {label}: {number}" for label, number in zip(_ROWS, trial.numbers, strict=True) if number),
+        *(f"  {labelled(name)}: {number}" for name, number in zip(SHOWN, trial.numbers, strict=True) if number),
         *(f"  before: {field} = {toml_value(field_value(before, field))}" for field in trial.values),
     ]
     write_worm(path, task.source, {"name": path.stem, "summary": task.title, **task.changes, **trial.values}, lines)
@@ -360,16 +367,14 @@ def results_table(task: Task, trials: Sequence[Trial]) -> Table:
     best = leader(trials, task.objectives)
     leaders = [] if best is None else [best]
     if len(task.objectives) == 2:
-        on_front = front(trials, task.objectives)
-        places = np.linspace(0, len(on_front) - 1, min(len(on_front), MOST_SHOWN))
-        leaders = [on_front[round(place)] for place in places.tolist()]
+        leaders = spread_evenly(MOST_SHOWN, front(trials, task.objectives))
     shown = [trials[0], *(one for one in leaders if one is not trials[0])]
     failed = sum(bool(trial.judged.problem) for trial in trials[1:])
     caption = f"{len(trials) - 1} trials, of which {failed} did not walk"
     table = Table("trial", title=task.title, caption=caption)
     for trial in shown:
         table.add_column(trial.name, justify="right")
-    for row in zip(_ROWS, *(trial.numbers for trial in shown), strict=True):
+    for row in zip(map(labelled, SHOWN), *(trial.numbers for trial in shown), strict=True):
         table.add_row(*row)
     table.add_section()
     fields = [variable.field for variable in task.variables]
@@ -382,6 +387,6 @@ def _figure(task: Task, trials: Sequence[Trial], stem: Path) -> Path:
     first, *others = objectives = task.objectives
     values = [[nan] * len(objectives) if one.judged.problem else one.scores(objectives) for one in trials]
     if not others:
-        return progress_figure([value for (value,) in values], first.label, first.more_is_better, stem)
+        return progress_figure([value for (value,) in values], labelled(first.number), first.more_is_better, stem)
     on_front = {one.name: one.scores(objectives) for one in front(trials, objectives)}
-    return pareto_figure(values, on_front, [one.label for one in objectives], first.more_is_better, stem)
+    return pareto_figure(values, on_front, [labelled(one.number) for one in objectives], first.more_is_better, stem)

@@ -11,7 +11,7 @@ from annelid.draw.render import Progress
 from annelid.errors import RunFileError
 from annelid.live.panel import legend_html
 from annelid.live.picture import Painter
-from annelid.live.player import config_of, player_of
+from annelid.live.player import player_of
 from annelid.live.server import Server, content_policy, with_extras
 from annelid.live.stage import Stage
 from annelid.output import whole_file, with_suffix
@@ -46,13 +46,13 @@ def export_page(
     path = page_path(path)
     if not 0 < speed < math.inf:
         raise RunFileError(f"speed = {speed:g}: the speed of a page must be positive and finite")
-    config = config_of(source)
+    config = source.config if isinstance(source, Run) else source
     player, anatomy = player_of(source)
-    reel, worm = player.reel, player.worm
-    first_s, last_s = reel.span_s if worm is None else (0.0, config.duration_s)
+    history, worm = player.history, player.worm
+    first_s, last_s = history.span_s if worm is None else (0.0, config.duration_s)
     n_frames = math.floor((last_s - first_s) * FRAMES_A_SECOND + 1e-6) + 1
     painter = Painter(anatomy, config, GRAIN_M)
-    shown = reel.at(first_s)
+    shown = history.at(first_s)
     # A server that nobody visits records what it would send.
     server = Server()
     try:
@@ -62,7 +62,7 @@ def export_page(
             time_s = first_s + frame / FRAMES_A_SECOND
             if worm is not None:
                 worm.advance(time_s, math.inf)
-            moment = reel.at(time_s + 0.5 / FRAMES_A_SECOND)
+            moment = history.at(time_s + 0.5 / FRAMES_A_SECOND)
             if moment is not shown:
                 stage.show(moment, follow=True)
                 shown = moment

@@ -12,7 +12,7 @@ import numpy as np
 from annelid.config import Knob, RunConfig
 from annelid.draw.canvas import CONTRACTED, RELAXED, segment_colors
 from annelid.draw.figures.network_diagram import by_segment, network_of, role_of
-from annelid.live.living import knobs_of
+from annelid.live.live_worm import knobs_of
 from annelid.live.network import colors_html, network_html
 from annelid.live.picture import CONTACT_COLOR, SPRING_COLORS, SPRING_RANGE, STRAND_COLORS
 from annelid.live.player import FASTEST, SLOWEST
@@ -37,7 +37,7 @@ MOST_SAMPLES = 250  # of one curve of a plot
 class Curve:
     """One signal of a plot."""
 
-    signal: str  # its name in the reel
+    signal: str  # its name in the history
     label: str
     number: int  # its place among the plot's colours
     dashed: bool = False
@@ -51,7 +51,7 @@ class Plot:
     curves: tuple[Curve, ...]
     n_colors: int
     limits: tuple[float, float] | None = None  # ends of the axis, or None for those of the curves
-    series: tuple[Array, ...] = ()  # times and the curves' values, where these are not signals of the reel
+    series: tuple[Array, ...] = ()  # times and the curves' values, where these are not signals of the history
 
     def window(self, first_s: float, last_s: float) -> tuple[Array, ...]:
         """Returns times and values of its `series` in a stretch of time, thinned."""
@@ -61,12 +61,12 @@ class Plot:
 
 
 def neurons_of(names: Sequence[str]) -> Sequence[str]:
-    """Returns the neurons among the signals of a `Reel`, which come first."""
+    """Returns the neurons among the signals of a `History`, which come first."""
     return [name for name in names if not name.startswith("activation_")]
 
 
 def plots_of(names: Sequence[str]) -> dict[str, Plot]:
-    """Returns the plots that the signals of a `Reel` make, by the names to choose from; first the default."""
+    """Returns the plots that the signals of a `History` make, by the names to choose from; first the default."""
     neurons = neurons_of(names)
     muscles = names[len(neurons) :]
     segments, others = by_segment(neurons)
@@ -122,23 +122,23 @@ class Panel:
         self._poke: Any = None
         if player.worm is not None:
             self._physics(view, player.worm.config, weight_N)
-        network = network_of(view.config, neurons) if (neurons := neurons_of(player.reel.names)) else None
+        network = network_of(view.config, neurons) if (neurons := neurons_of(player.history.names)) else None
         self._n_neurons, self._colors = len(neurons), None
         if network is not None:
             with gui.add_folder("Network, coloured by potential", expand_by_default=len(neurons) <= MOST_NEURONS):
                 gui.add_html(network_html(network))
                 self._colors = gui.add_html("")
-        self._plots = {**(plots or {}), **plots_of(player.reel.names)}
+        self._plots = {**(plots or {}), **plots_of(player.history.names)}
         self._plot_folder = gui.add_folder(f"{'Signals' if plots else 'Nervous system'}, last 5 s")
         self._chart: Any = None
         with self._plot_folder:
             choice = gui.add_dropdown("plot", list(self._plots), initial_value=next(iter(self._plots)))
-            choice.on_update(lambda event: view.ask(self.choose_plot, str(event.target.value)))
+            choice.on_update(lambda event: view.request(self.choose_plot, str(event.target.value)))
         with gui.add_folder("Colours"):
             gui.add_html(legend)
         with gui.add_folder("Shown", expand_by_default=False):
             follow = gui.add_checkbox("follow the worm", initial_value=True)
-            follow.on_update(lambda event: view.ask(setattr, view, "follow", bool(event.target.value)))
+            follow.on_update(lambda event: view.request(setattr, view, "follow", bool(event.target.value)))
             for layer in LAYERS:
                 box = gui.add_checkbox(layer, initial_value=True)
                 box.on_update(_asking(view, view.stage.set_visible, layer))
@@ -155,7 +155,7 @@ class Panel:
         buttons = {PLAY: player.toggle, **({NOW: player.go_live} if living else {}), AGAIN: view.restart}
         live_hint = "Live: the present, and on from there. Restart: time zero, with the sliders as they are."
         row = gui.add_button_group("", list(buttons), hint=live_hint if living else "Restart: from the beginning.")
-        row.on_click(lambda event: view.ask(buttons[str(event.target.value)]))
+        row.on_click(lambda event: view.request(buttons[str(event.target.value)]))
         self._time = gui.add_slider("time (s)", 0.0, 0.01, 0.01, 0.0, hint="Drag to look at another time.")
         self._time.on_update(_asking(view, player.seek))
         hint = "Simulated seconds per second; the worm may not keep up."
@@ -169,14 +169,14 @@ class Panel:
                 self._knobs[knob] = gui.add_slider(
                     knob.label, knob.low, knob.high, knob.step, knob.shown(config), hint=knob.hint
                 )
-                self._knobs[knob].on_update(_asking(view, view.turn, knob))
+                self._knobs[knob].on_update(_asking(view, view.set_knob, knob))
             hint = "Force of a poke, the worm's weight at first: click on the worm to push it away from you for 0.15 s."
             self._poke = gui.add_slider("poke (N)", 0.0, STRONGEST_POKE * weight_N, 0.1, weight_N, hint=hint)
             again = gui.add_button("Reset sliders", hint="Gives every slider above its first value.")
-            again.on_click(lambda _: view.ask(self._reset, view))
+            again.on_click(lambda _: view.request(self._reset, view))
 
     def _reset(self, view: View) -> None:
-        view.as_at_first()
+        view.reset_knobs()
         assert view.player.worm is not None
         for knob, slider in self._knobs.items():
             slider.value = knob.shown(view.player.worm.config)
@@ -185,7 +185,7 @@ class Panel:
         """Puts another plot in place of the present one; it is empty until `update`."""
         self._plot = plot = self._plots[name]
         signals = () if plot.series else (curve.signal for curve in plot.curves)
-        self._columns = [self._player.reel.names.index(signal) for signal in signals]
+        self._columns = [self._player.history.names.index(signal) for signal in signals]
         if self._chart is not None:
             self._chart.remove()
         colors = [_css(color) for color in segment_colors(max(plot.n_colors, 1))]
@@ -204,11 +204,11 @@ class Panel:
     def update(self, status: str) -> None:
         """Shows the state of things, as HTML, the present time, and the signals of the last seconds before it."""
         self._status.content = status
-        reel, time_s = self._player.reel, self._player.moment.time_s
-        first, last = reel.span_s
+        history, time_s = self._player.history, self._player.moment.time_s
+        first, last = history.span_s
         self._time.min, self._time.max = first, max(last, first + 0.01)
         self._time.value = time_s
-        times, values = reel.window(time_s - SECONDS, time_s, MOST_SAMPLES)
+        times, values = history.window(time_s - SECONDS, time_s, MOST_SAMPLES)
         if len(times):
             drawn = (times, *values[:, self._columns].T)
             self._chart.data = self._plot.window(time_s - SECONDS, time_s) if self._plot.series else drawn
@@ -226,7 +226,7 @@ def _asking(view: View, call: Callable[..., Any], *first: Any) -> Callable[[Any]
 
     def on_update(event: Any) -> None:
         if event.client_id is not None:
-            view.ask(call, *first, event.target.value)
+            view.request(call, *first, event.target.value)
 
     return on_update
 

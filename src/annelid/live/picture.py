@@ -11,7 +11,7 @@ from annelid.body.formulations.rods.net import STRAND_RGBA
 from annelid.config import RunConfig
 from annelid.draw.canvas import CONTRACTED, RELAXED
 from annelid.draw.scene import Skeleton
-from annelid.live.living import Moment
+from annelid.live.history import Moment
 from annelid.morphology import Array
 from annelid.simulation.anatomy import Anatomy
 
@@ -118,7 +118,7 @@ def spring_colors(strain: NDArray[np.floating]) -> Colors:
     return _bytes(np.repeat(colors, 2, axis=0)).reshape(-1, 2, 3)
 
 
-def struck(points_m: Array, origin_m: Array, direction: Array) -> Array | None:
+def hit_point(points_m: Array, origin_m: Array, direction: Array) -> Array | None:
     """Returns the point ``(3,)`` that a ray hits first, or None: the nearest, of ``(n, 3)``, within `REACH_M`."""
     offsets = points_m - origin_m
     depth = offsets @ direction

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 
 from annelid.config import RunConfig
-from annelid.errors import ConfigError, SimulationStopped
-from annelid.live.living import LivingWorm, Moment, Reel, reel_of
+from annelid.errors import SimulationStopped
+from annelid.live.history import History, Moment, history_of
+from annelid.live.live_worm import LiveWorm
 from annelid.simulation.anatomy import Anatomy
 from annelid.simulation.runfile import Run
 from annelid.simulation.worm import compile_worm
@@ -15,7 +16,7 @@ SLOWEST, FASTEST = 0.05, 10.0  # simulated seconds per second
 
 
 class Player:
-    """Shows a reel, playing from its first moment; at the end of a living worm's the worm goes on, a run's stops.
+    """Shows a history, playing from its first moment; at the end of a living worm's the worm goes on, a run's stops.
 
     Attributes:
         worm: The living worm, or None for a recorded run.
@@ -25,25 +26,25 @@ class Player:
         stopped: The sentence of the guard that stopped the worm, or an empty one.
     """
 
-    def __init__(self, source: LivingWorm | Reel, speed: float = 1.0) -> None:
-        self.worm = source if isinstance(source, LivingWorm) else None
-        self._reel = None if isinstance(source, LivingWorm) else source
+    def __init__(self, source: LiveWorm | History, speed: float = 1.0) -> None:
+        self.worm = source if isinstance(source, LiveWorm) else None
+        self._history = None if isinstance(source, LiveWorm) else source
         self.speed = speed
         self.stopped = ""
         self._rewind()
 
     @property
-    def reel(self) -> Reel:
+    def history(self) -> History:
         """What can be shown."""
         if self.worm is not None:
-            return self.worm.reel
-        assert self._reel is not None
-        return self._reel
+            return self.worm.history
+        assert self._history is not None
+        return self._history
 
     @property
     def moment(self) -> Moment:
         """What is shown now; of a worm that is followed the newest, up to a step of its body ahead of the clock."""
-        return self.reel.at(self.reel.span_s[1] if self.at_end else self._clock_s)
+        return self.history.at(self.history.span_s[1] if self.at_end else self._clock_s)
 
     def restart(self) -> None:
         """Starts a living worm anew, and a recorded run from its beginning."""
@@ -68,14 +69,14 @@ class Player:
 
     def seek(self, time_s: float) -> None:
         """Shows another time and pauses there."""
-        first, last = self.reel.span_s
+        first, last = self.history.span_s
         self._clock_s = min(max(time_s, first), last)
         self.at_end = self._clock_s >= last
         self.playing = False
 
     def go_live(self) -> None:
         """Shows the last moment and plays: a living worm goes on from there."""
-        self.seek(self.reel.span_s[1])
+        self.seek(self.history.span_s[1])
         self.playing = self.worm is not None and not self.stopped
 
     def tick(self, elapsed_s: float, deadline: float = math.inf) -> None:
@@ -86,7 +87,7 @@ class Player:
         if not self.playing:
             return
         wanted = self._clock_s + self.speed * elapsed_s
-        if wanted >= self.reel.span_s[1]:
+        if wanted >= self.history.span_s[1]:
             self.at_end = True
             if self.worm is not None and not self.stopped:
                 try:
@@ -95,24 +96,13 @@ class Player:
                     self.stopped, self.playing = str(stop), False
             else:
                 self.playing = False
-        self._clock_s = min(wanted, self.reel.span_s[1])
+        self._clock_s = min(wanted, self.history.span_s[1])
 
     def _rewind(self) -> None:
-        first, last = self.reel.span_s
+        first, last = self.history.span_s
         self._clock_s = first
         self.at_end = first >= last
         self.playing = True
-
-
-def config_of(source: RunConfig | Run) -> RunConfig:
-    """Returns the configuration that a worm is run under, or was; refuses a planar worm."""
-    config = source.config if isinstance(source, Run) else source
-    if config.body.geometry() is None:
-        raise ConfigError(
-            f"body.kind = {config.body.kind!r} has nothing to view in 3D; only the 3D worm (body.kind = 'worm') has: "
-            "use annelid run and annelid draw"
-        )
-    return config
 
 
 def player_of(source: RunConfig | Run, speed: float = 1.0) -> tuple[Player, Anatomy]:
@@ -122,9 +112,8 @@ def player_of(source: RunConfig | Run, speed: float = 1.0) -> tuple[Player, Anat
         ConfigError: The body is planar, or cannot be built.
         RunFileError: The run holds no postures.
     """
-    config = config_of(source)
     if isinstance(source, Run):
-        anatomy = compile_worm(config)
-        return Player(reel_of(source, anatomy.model.nq), speed), anatomy
-    worm = LivingWorm(config)
+        anatomy = compile_worm(source.config)
+        return Player(history_of(source, anatomy.model.nq), speed), anatomy
+    worm = LiveWorm(source)
     return Player(worm, speed), worm.plant.anatomy

@@ -1,4 +1,4 @@
-"""A view while it is open: the one loop in which the worm runs, the scene is drawn and the user's wishes are met."""
+"""A view while it is open: the one loop in which the worm runs, the scene is drawn and requests of the page are met."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from annelid.config import RunConfig
-from annelid.live.living import Moment
+from annelid.live.history import Moment
 from annelid.live.panel import Panel, Plot, legend_html, status_html
-from annelid.live.picture import Painter, struck
-from annelid.live.player import config_of, player_of
+from annelid.live.picture import Painter, hit_point
+from annelid.live.player import player_of
 from annelid.live.server import LOOPBACK, Server
 from annelid.live.stage import Stage
 from annelid.live.view import View
@@ -62,7 +62,7 @@ class Show(View):
             ConfigError: The body is planar, or cannot be built.
             RunFileError: The run holds no postures.
         """
-        config = config_of(source)
+        config = source.config if isinstance(source, Run) else source
         player, anatomy = player_of(source, speed)
         painter = Painter(anatomy, config)
         self._ending = threading.Event()
@@ -76,7 +76,7 @@ class Show(View):
         legend = legend_html(painter.arrow_N, anatomy.geometry.radius_m)
         self.panel = Panel(self._server, self, speed, weight_N, legend, plots)
         if self.player.worm is not None:
-            self._server.scene.on_click()(lambda event: self.ask(self.poke, event.ray_origin, event.ray_direction))
+            self._server.scene.on_click()(lambda event: self.request(self.poke, event.ray_origin, event.ray_direction))
 
     def __enter__(self) -> Self:
         return self
@@ -89,7 +89,7 @@ class Show(View):
         last = panel_due = perf_counter()
         while not self._ending.is_set():
             begun = perf_counter()
-            self.meet_wishes()
+            self.meet_requests()
             self.player.tick(min(begun - last, LONGEST_TICK_S), deadline=begun + 1.0 / FRAMES_A_SECOND)
             last = begun
             self._draw()
@@ -115,7 +115,7 @@ class Show(View):
             self.notice = "This is the past: press Live and poke the worm again."
             return
         origin, sight = self.stage.to_model(np.asarray(origin_m), np.asarray(direction))
-        place = struck(self.stage.picture.strands.reshape(-1, 3).astype(float), origin, sight)
+        place = hit_point(self.stage.picture.strands.reshape(-1, 3).astype(float), origin, sight)
         if place is not None:
             worm.poke(place, self.panel.poke_N * sight)
 

@@ -21,9 +21,9 @@ from annelid.config import RunConfig
 from annelid.config.run import ArenaKind
 from annelid.draw.camera import FIELD_OF_VIEW_DEG, fitting_distance, picture_axes, view_angles
 from annelid.draw.scene import ROOM, upright
-from annelid.live.living import Moment
+from annelid.live.history import Moment
 from annelid.live.picture import CONTACT_COLOR, Painter
-from annelid.live.things import Things
+from annelid.live.scene_geoms import SceneGeoms
 from annelid.morphology import Array, heading_turn
 
 if TYPE_CHECKING:
@@ -93,8 +93,8 @@ class Stage:
         heading = config.body.first_heading_deg
         assert config.arena is not None
         _add_ground(scene, config.arena, float(np.ptp(first.strands[..., 0])), heading)
-        self._things = Things(scene, f"{_ROOT}/ground", painter.model, Shape(*_squares(0.0)), _FLOOR_LOOK)
-        self._things.place(*painter.places(self._things.geoms))
+        self._geoms = SceneGeoms(scene, f"{_ROOT}/ground", painter.model, Shape(*_squares(0.0)), _FLOOR_LOOK)
+        self._geoms.place(*painter.places(self._geoms.geoms))
         self._first_middle = first.middle
         self._level = config.arena.is_plane and config.arena.slope_rad == 0.0
         points = first.strands.reshape(-1, 3) @ self.turn.T
@@ -116,7 +116,7 @@ class Stage:
         self._springs.points = picture.springs
         self._springs.colors = picture.spring_colors
         self._contacts.points = picture.contacts
-        self._things.place(*self._painter.places(self._things.geoms))
+        self._geoms.place(*self._painter.places(self._geoms.geoms))
         shift = self.turn @ (self._first_middle - picture.middle) if follow else np.zeros(3)
         if self._level:
             # A worm that breathes is not to make the ground bob.

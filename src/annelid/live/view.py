@@ -1,4 +1,4 @@
-"""A worm that is looked at, and what its user asks for."""
+"""A worm that is looked at, and what its user requests."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from annelid.live.stage import Stage
 
 
 class View:
-    """A worm, the scene in which it is seen, and what is asked of both.
+    """A worm, the scene in which it is seen, and what is requested of both.
 
-    All that changes the worm, the player or the scene is done by one loop; other threads `ask` for it.
+    All that changes the worm, the player or the scene is done by one loop; other threads `request` it.
 
     Attributes:
         config: What the worm is run under, or was.
@@ -31,39 +31,39 @@ class View:
         self.stage = stage
         self.follow = True
         self.notice = ""
-        self._wishes: dict[tuple[Any, ...], tuple[Callable[..., None], tuple[Any, ...]]] = {}
-        self._wishing = threading.Lock()
+        self._requests: dict[tuple[Any, ...], tuple[Callable[..., None], tuple[Any, ...]]] = {}
+        self._lock = threading.Lock()
 
-    def ask(self, call: Callable[..., None], *arguments: Any) -> None:
+    def request(self, call: Callable[..., None], *arguments: Any) -> None:
         """Has the loop call something; may be called from any thread.
 
         Of calls that differ in their last argument only, as while a slider is dragged, the last one counts.
         """
-        with self._wishing:
-            self._wishes[call.__name__, *arguments[:-1]] = call, arguments
+        with self._lock:
+            self._requests[call.__name__, *arguments[:-1]] = call, arguments
 
     def restart(self) -> None:
         """Begins anew, with the sliders as they are."""
         self.notice = ""
         self.player.restart()
 
-    def turn(self, knob: Knob, shown: float) -> None:
+    def set_knob(self, knob: Knob, shown: float) -> None:
         """Changes a field of the running worm to what a slider shows."""
         assert self.player.worm is not None
         self.notice = ""
         self.player.worm.adjust({knob.field: knob.value(shown)})
 
-    def as_at_first(self) -> None:
-        """Gives every field that was turned its first value."""
+    def reset_knobs(self) -> None:
+        """Gives every field that was changed its first value."""
         assert self.player.worm is not None
         self.notice = ""
-        self.player.worm.as_at_first()
+        self.player.worm.reset_fields()
 
-    def meet_wishes(self) -> None:
-        """Makes the calls that were asked for; the sentence of one that fails is noticed."""
-        with self._wishing:
-            wishes, self._wishes = self._wishes, {}
-        for call, arguments in wishes.values():
+    def meet_requests(self) -> None:
+        """Makes the calls that were requested; the sentence of one that fails becomes the notice."""
+        with self._lock:
+            requests, self._requests = self._requests, {}
+        for call, arguments in requests.values():
             try:
                 call(*arguments)
             except AnnelidError as error:

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.arena.geoms import touching
+from annelid.arena.geoms import skin_geoms
 from annelid.arena.ground import surface_of
 from annelid.arena.surface import Surface
 from annelid.body.actuation import crossing_site, ring_names, stretch_sensors
@@ -35,7 +35,7 @@ def add_contact_sensors(spec: mujoco.MjSpec, arena: ArenaKind) -> None:
         return
     force = 1 << int(mujoco.mjtConDataField.mjCONDATA_FORCE)
     grounds = [geom.name for geom in spec.geoms if geom.contype]
-    pairs = [(ground, geom.name) for geom in touching(spec) for ground in grounds]
+    pairs = [(ground, geom.name) for geom in skin_geoms(spec) for ground in grounds]
     pairs += [(pair.geomname1, pair.geomname2) for pair in spec.pairs]
     for ground, skin in pairs:
         spec.add_sensor(

@@ -7,6 +7,7 @@ is read.
 
 from __future__ import annotations
 
+from math import prod
 from typing import Any
 
 import h5py
@@ -31,24 +32,24 @@ def check_content(file: h5py.File, size: int) -> None:
     """
     stored = unstored = 0
     texts = _Texts(size)
-    groups: list[tuple[str, h5py.Group]] = [("", file)]
-    for path, group in groups:
-        if len(group) > _MOST_OBJECTS:
-            raise ValueError(f"{path or 'it'} holds {len(group)} parts, more than the {_MOST_OBJECTS} allowed")
-        _check_attributes(path or "/", group, texts)
-        for key in group:
+    parts: list[tuple[str, h5py.Group | h5py.Dataset]] = [("", file)]
+    for path, part in parts:
+        _check_attributes(path or "/", part, texts)
+        if isinstance(part, h5py.Dataset):
+            n_stored, n_unstored = _check_variable(path, part, size, texts)
+            stored, unstored = stored + n_stored, unstored + n_unstored
+            continue
+        if len(part) > _MOST_OBJECTS:
+            raise ValueError(f"{path or 'it'} holds {len(part)} parts, more than the {_MOST_OBJECTS} allowed")
+        for key in part:
             name = f"{path}/{key}"
             # Asked of the link itself, since to open a part is to follow its link.
-            if type(group.get(key, getlink=True)) is not h5py.HardLink:
+            if type(part.get(key, getlink=True)) is not h5py.HardLink:
                 raise ValueError(f"{name!r} is a link to elsewhere, which a run file does not have")
-            part = group[key]
-            if isinstance(part, h5py.Group) and not path:
-                groups.append((name, part))
-            elif isinstance(part, h5py.Dataset):
-                n_stored, n_unstored = _check_variable(name, part, size, texts)
-                stored, unstored = stored + n_stored, unstored + n_unstored
-            else:
+            inner = part[key]
+            if not isinstance(inner, h5py.Dataset) and (path or not isinstance(inner, h5py.Group)):
                 raise ValueError(f"{name!r} is no variable, and a run file has no other parts there")
+            parts.append((name, inner))
     if stored > size or unstored > _UNSTORED_SHARE * size:
         raise ValueError(f"its variables declare {stored + unstored} bytes, and the file has {size}")
 
@@ -67,8 +68,7 @@ class _Texts:
 
 def _check_variable(name: str, dataset: h5py.Dataset, size: int, texts: _Texts) -> tuple[int, int]:
     """Returns the bytes that a variable has in the file, and those that it only declares."""
-    variable = dataset.id
-    made = variable.get_create_plist()
+    variable, made = dataset.id, dataset.id.get_create_plist()
     if made.get_layout() not in _LAYOUTS or made.get_external_count() or made.get_nfilters():
         raise ValueError(
             f"{name!r} is virtual, external, chunked or compressed, and a run file stores plain numbers within itself"
@@ -78,10 +78,8 @@ def _check_variable(name: str, dataset: h5py.Dataset, size: int, texts: _Texts) 
         raise ValueError(f"{name!r} holds neither numbers nor texts")
     if dataset.ndim > _MOST_DIMENSIONS:
         raise ValueError(f"{name!r} has {dataset.ndim} dimensions, more than the {_MOST_DIMENSIONS} allowed")
-    _check_attributes(name, dataset, texts)
-    count = int(np.prod(variable.shape or (0,), dtype=object)) if variable.shape != () else 1
-    length = count * kind.get_size()
-    offset = variable.get_offset()
+    count = prod(map(int, variable.shape)) if variable.shape is not None else 0
+    length, offset = count * kind.get_size(), variable.get_offset()
     if made.get_layout() == h5py.h5d.CONTIGUOUS and offset is None:
         return 0, length
     if length > (variable.get_storage_size() if offset is None else size - offset):

@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.arena.geoms import SCENE, touching
+from annelid.arena.geoms import SCENE, skin_geoms
 from annelid.config import ArenaKind
 from annelid.morphology import Array
 
@@ -44,7 +44,7 @@ def in_scene(model: mujoco.MjModel) -> NDArray[np.bool_]:
 def add_scene_sensors(spec: mujoco.MjSpec, object_names: tuple[str, ...]) -> None:
     """Adds sensors of what touches every part of the skin, and of the force of each on every body that moves."""
     kinds = mujoco.mjtObj
-    skin = [geom.name for geom in touching(spec)]
+    skin = [geom.name for geom in skin_geoms(spec)]
     for what, fields, reduce in (("net", _FORCE, _NET_FORCE), ("deepest", _PLACE, _DEEPEST)):
         for name in skin:
             spec.add_sensor(

@@ -165,7 +165,7 @@ def _without_gone_fields(data: xarray.Dataset) -> xarray.Dataset:
         tree = parse_json(data.attrs["config"], "the configuration")
         for path, instead in REPLACED.items():
             *sections, field = path.split(".")
-            section = reduce(lambda part, name: part.get(name, {}), sections, tree)
+            section = reduce(lambda part, name: part.get(name) or {}, sections, tree)
             if field not in section or has_field(path, tree):
                 continue
             value = section.pop(field)

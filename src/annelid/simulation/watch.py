@@ -27,6 +27,8 @@ LONG_CONTRACTION_S = 0.5
 """In a contraction as long as this, the slowest of the robots' cables shortens its ring by more than `HARDLY`."""
 LONG = 3.0
 """Length of an axial spring, over that at rest, from which a run is doubtful."""
+MOST_STRETCH = 1.1
+"""Length of an axial spring, over that at which the strands beside it are straight, at which a run is stopped."""
 DEEP = 0.1
 """Depth of a vertex in the ground, over the mesh's radius, from which a run is doubtful: twice what presets reach."""
 WIDE_GAP = 0.5
@@ -108,15 +110,15 @@ class Watch:
             if value / rest_m[place] > most / rest_m[where]:
                 self._extremes[name] = value, time_s, place
         guard, ring_m = self._guard, float(np.minimum.reduce(rings))
-        if ring_m < guard.ring_closure * self._ring_least_m:
+        if ring_m < self._ring_least_m:
             return (
-                f"ring {int(rings.argmin()) + 1} is {ring_m:.3g} m long, below the limit guard.ring_closure = "
-                f"{guard.ring_closure:g} times the {self._ring_least_m:.3g} m at which its crossings touch"
+                f"ring {int(rings.argmin()) + 1} is {ring_m:.3g} m long, below the limit of {self._ring_least_m:.3g} "
+                "m at which its crossings touch"
             )
-        if spring_m > guard.stretch * spring_most_m:
+        if spring_m > MOST_STRETCH * spring_most_m:
             return (
-                f"an axial spring is {spring_m:.3g} m long, above the limit guard.stretch = {guard.stretch:g} times "
-                f"the {spring_most_m:.3g} m at which the strands beside it are straight"
+                f"an axial spring is {spring_m:.3g} m long, above the limit of {MOST_STRETCH:g} times the "
+                f"{spring_most_m:.3g} m at which the strands beside it are straight"
             )
         if depth_m > guard.depth_m:
             return (

@@ -132,9 +132,8 @@ def read_columns(path: Path, time: str | None, wanted: Mapping[str, str]) -> tup
 
 def binned(at: Array, values: Array, n: int) -> tuple[Array, Array]:
     """Means of points over n even ranges of where they were measured, those without a point left out."""
-    edges = np.linspace(at.min(), at.max(), n + 1)
-    place = np.clip(np.searchsorted(edges, at, side="right") - 1, 0, n - 1)
-    count = np.bincount(place, minlength=n)
-    there = count > 0
-    means = [np.bincount(place, weights=one, minlength=n)[there] / count[there] for one in (at, values)]
+    from scipy.stats import binned_statistic
+
+    means, _, _ = binned_statistic(at, [at, values], bins=n)
+    means = means[:, np.isfinite(means[0])]
     return means[0], means[1]

@@ -146,7 +146,6 @@ class Model:
         n_fitted = sum(int((~held).sum()) for held in self.rows)
         if n_fitted <= len(study.parameters):
             raise ConfigError(f"{n_fitted} points cannot fit {len(study.parameters)} parameters")
-        self._known: dict[bytes, list[Array]] = {}
         self._slopes: list[tuple[Array, list[Array]]] = []
 
     def worms(self, logs: Array) -> tuple[RunConfig, list[Experiment]]:
@@ -180,13 +179,12 @@ class Model:
 
     def predicted(self, many: Sequence[Array], stage: str = "identifying") -> list[list[Array]]:
         """Predicts all points of several worms, in the order of the experiments."""
-        new = [logs for logs in many if logs.tobytes() not in self._known]
-        if new:
-            for logs, found in zip(new, self.found(new, stage), strict=True):
-                config, experiments = self.worms(logs)
-                pairs = zip(experiments, self.data, found, strict=True)
-                self._known[logs.tobytes()] = [one.predicted(config, data, what) for one, data, what in pairs]
-        return [self._known[logs.tobytes()] for logs in many]
+        predicted: list[list[Array]] = []
+        for logs, found in zip(many, self.found(many, stage), strict=True):
+            config, experiments = self.worms(logs)
+            pairs = zip(experiments, self.data, found, strict=True)
+            predicted.append([one.predicted(config, data, what) for one, data, what in pairs])
+        return predicted
 
     def derivatives(self, logs: Array, stage: str = "identifying") -> list[Array]:
         """Returns the change of every prediction for a relative change of each parameter, ``(n, p)``."""

@@ -16,10 +16,12 @@ from dataclasses import dataclass
 from importlib import resources
 from math import inf
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
 from rich.table import Table
+from scipy.stats import binned_statistic
 
 from annelid.arena import Floor
 from annelid.body import WormBody, build_spec, compile_spec, crossing_site, ring_names, worm_of, wrap_factors
@@ -92,18 +94,17 @@ class Loop:
         """
         values = self.force_N if values is None else values
         half = (at_m[1] - at_m[0]) / 2
-        edges = np.append(at_m - half, at_m[-1] + half)
-        force = np.empty((2, len(at_m)))
-        for row, branch in zip(force, (slice(None, self.turn + 1), slice(self.turn, None)), strict=True):
-            x = self.displacement_m[branch]
-            count, _ = np.histogram(x, edges)
-            if not count.all():
-                raise AnnelidError(
-                    f"the loop has no sample near {at_m[int(count.argmin())] / MM:g} mm: it covers "
-                    f"{x.min() / MM:.0f} to {x.max() / MM:.0f} mm with {len(x)} samples"
-                )
-            row[:] = np.histogram(x, edges, weights=values[branch])[0] / count
-        return force
+        edges: Any = np.append(at_m - half, at_m[-1] + half)
+        branches = (slice(None, self.turn + 1), slice(self.turn, None))
+        found = [binned_statistic(self.displacement_m[one], values[one], bins=edges) for one in branches]
+        means = np.array([one.statistic for one in found])
+        if len(empty := np.flatnonzero(np.isnan(means).any(axis=0))):
+            x = self.displacement_m
+            raise AnnelidError(
+                f"the loop has no sample near {at_m[empty[0]] / MM:g} mm: it covers "
+                f"{x.min() / MM:.0f} to {x.max() / MM:.0f} mm with {len(x)} samples"
+            )
+        return means
 
 
 def read_loop(path: str | Path | None = None) -> Loop:

@@ -13,9 +13,9 @@ from rich.table import Table
 
 from annelid.experiment import write_worm
 from annelid.output import write_json
-from annelid_lab.calibration.figure import Drawn, identify_figure
+from annelid_lab.calibration.figure import identify_figure
 from annelid_lab.calibration.fit import Fit, fitted
-from annelid_lab.calibration.intervals import LEVEL, Intervals, band, intervals
+from annelid_lab.calibration.intervals import LEVEL, Intervals, intervals
 from annelid_lab.calibration.simulations import Simulations
 from annelid_lab.calibration.study import IdentifyStudy
 
@@ -163,16 +163,8 @@ def write_identified(found: Identified, output: Path) -> list[Path]:
         lines.append(f"  {name}: {value:.4g} {unit}, {known.profile[i, 0]:.4g} to {known.profile[i, 1]:.4g}")
     lines.append(f"Errors for `annelid run --uncertainty-from {REPORT}`.")
     write_worm(output / WORM, found.study.source(found.folder), {"name": found.study.name, **found.overrides}, lines)
-    return [write_json(output / REPORT, found.to_dict()), output / WORM, _figure(found, output / "calibration")]
-
-
-def _figure(found: Identified, stem: Path) -> Path:
-    fit = found.fit
-    drawn: list[Drawn] = []
-    for part in fit.parts:
-        width = band(fit, part, part.data, part.jacobian)
-        held = (part.held.at, part.held.values, part.held_fitted)
-        data = part.data
-        one = Drawn(part.experiment.name, data.labels, data.series, data.at, data.values, part.fitted, width, held)
-        drawn.append(one)
-    return identify_figure(drawn, fit.names, found.intervals.correlation, stem)
+    return [
+        write_json(output / REPORT, found.to_dict()),
+        output / WORM,
+        identify_figure(fit, known, output / "calibration"),
+    ]

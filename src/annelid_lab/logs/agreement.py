@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize_scalar
 from scipy.signal import correlate, find_peaks
+from scipy.stats import binned_statistic
 
 from annelid.analysis import forward_position, track_of
 from annelid.body import stretch_sensors, worm_of
@@ -383,11 +384,9 @@ def _fundamental(values: Array, time_s: Array, period_s: float) -> np.complex128
 
 def _mean_cycle(values: Array, time_s: Array, period_s: float, bins: int = 40) -> Array:
     """The mean over cycles at ``bins`` phases, interpolated where a gap leaves one empty."""
-    at = np.minimum((time_s / period_s % 1.0 * bins).astype(int), bins - 1)
-    count = np.bincount(at, minlength=bins)
-    filled = np.flatnonzero(count)
-    mean = np.bincount(at, weights=values, minlength=bins)[filled] / count[filled]
-    return np.interp(np.arange(bins), filled, mean, period=bins)
+    mean, _, _ = binned_statistic(time_s / period_s % 1.0, values, bins=bins, range=(0.0, 1.0))
+    filled = np.flatnonzero(np.isfinite(mean))
+    return np.interp(np.arange(bins), filled, mean[filled], period=bins)
 
 
 def _correlated(a: Array, b: Array) -> float:

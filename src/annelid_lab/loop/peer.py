@@ -66,7 +66,7 @@ class Peer:
 
     def _answer(self, frame: Frame) -> Frame | None:
         if frame.kind == Kind.HELLO:
-            return self._greeted(frame)
+            return self._answer_hello(frame)
         if frame.session != self._session:
             return None
         if frame.kind == Kind.STOP:
@@ -89,7 +89,7 @@ class Peer:
             return Frame(Kind.ERROR, frame.session, frame.sequence, bytes(fault.args[:1]))
         return Frame(self._goes, frame.session, frame.sequence, packed(returned))
 
-    def _greeted(self, frame: Frame) -> Frame | None:
+    def _answer_hello(self, frame: Frame) -> Frame | None:
         try:
             hello = Hello.read(frame.payload)
         except FrameError:

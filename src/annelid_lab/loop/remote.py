@@ -45,7 +45,7 @@ class PacedPlant(ABC):
         self.partner, self._pace, self._limits = partner, pace, limits
         self._rest_m, self._timestep_s = rest_m[:, np.newaxis], timestep_s
         self._n_steps = round(pace.period_s / timestep_s)
-        self._taken, self._is_fresh = 0, False
+        self._n_taken, self._is_new = 0, False
         self.command = np.zeros(n_muscles)
         self._sent_s = pace.clock()
         self._sensed: dict[str, Array] = {}
@@ -76,14 +76,14 @@ class PacedPlant(ABC):
             ConfigError: There is no robot, it does not fit, or its sensors cannot be read.
         """
         self._begin()
-        self._taken, self.command = 0, np.zeros(self.n_muscles)
+        self._n_taken, self.command = 0, np.zeros(self.n_muscles)
         self._sensed = {}
         try:
             while not self._sensed:
                 self._move(self.command)
         except SimulationStopped as stop:
             raise ConfigError(f"the robot does not begin: {stop}") from None
-        self._is_fresh = True
+        self._is_new = True
         return self._sensation()
 
     def step(self, activation: Array) -> Sensation:
@@ -92,17 +92,17 @@ class PacedPlant(ABC):
 
     def steps_to_move(self) -> int:
         """Returns the control steps to the end of the period."""
-        return self._n_steps - self._taken % self._n_steps
+        return self._n_steps - self._n_taken % self._n_steps
 
     def stride(self, activation: Array) -> Sensation:
         """Advances by at most `steps_to_move` control steps."""
-        if self._is_fresh:
+        if self._is_new:
             # Since the reset a file was laid out, for which a robot's own watchdog does not wait.
-            self._is_fresh = False
+            self._is_new = False
             self._begin()
             self._pace.restart()
-        self._taken += len(activation)
-        if self._taken % self._n_steps == 0:
+        self._n_taken += len(activation)
+        if self._n_taken % self._n_steps == 0:
             self._move(activation[-1])
         return self._sensation()
 
@@ -138,7 +138,7 @@ class PacedPlant(ABC):
         angle = sensed["heading_rad"][0] if "heading_rad" in sensed else math.nan
         unknown = np.full(self.n_muscles, math.nan)
         return Sensation(
-            time_s=self._taken * self._timestep_s,
+            time_s=self._n_taken * self._timestep_s,
             stretch_m=self._rest_m + sensed.get("lengthening_m", np.full(n, math.nan))[:, np.newaxis],
             rest_stretch_m=self._rest_m,
             ring_length_m=unknown,
@@ -188,18 +188,18 @@ class RemoteController:
         """Takes what is at the end of the line; ``keeps_pace`` where the body does not wait for the clock itself."""
         self.partner, self._pace, self._interface = partner, pace, interface
         self._n_steps, self._keeps_pace = n_steps, keeps_pace
-        self._taken = 0
+        self._n_taken = 0
         self._activation = np.zeros(interface.n_muscles)
 
     def reset(self, seed: int) -> None:
         """Connects, by which the firmware returns to its initial state."""
         self.partner.connect()
-        self._taken, self._activation = 0, np.zeros(self._interface.n_muscles)
+        self._n_taken, self._activation = 0, np.zeros(self._interface.n_muscles)
 
     def step(self, sensation: Sensation) -> Array:
         """Advances by one control step; what the firmware is given at the first of a period counts during all of it."""
-        if self._taken % self._n_steps == 0:
-            if self._taken == 0:
+        if self._n_taken % self._n_steps == 0:
+            if self._n_taken == 0:
                 # As a robot: between reset and first step may be more than its watchdog waits.
                 self.partner.connect()
             if self._keeps_pace:
@@ -208,7 +208,7 @@ class RemoteController:
             activation = self.partner.exchange(np.concatenate(sensed))
             if activation is not None:
                 self._activation = activation
-        self._taken += 1
+        self._n_taken += 1
         return self._activation
 
     def stride(self, sensation: Sensation, n_steps: int) -> Array:

@@ -215,7 +215,7 @@ class ServoPlant(PacedPlant):
             self._write(Register.GOAL, 4, self._wiring.goals(command))
             counts = self._read(Register.POTENTIOMETER, ANSWER * self._pace.period_s)
         except OSError as error:
-            raise self.partner.gone(error) from None
+            raise self.partner.line_lost(error) from None
         is_whole = len(counts) == self.n_muscles
         self.partner.answered(self._pace.clock() - began if is_whole else None)
         if not is_whole:

@@ -29,12 +29,12 @@ _AHEAD_S = 0.0005
 
 
 def percentiles(times_s: array[float]) -> dict[str, float | None]:
-    """Returns the percentiles of times that are reported, s; None where there are no times."""
+    """Returns the percentiles of times that are reported, s, to a microsecond; None where there are no times."""
     shares = {"median": 50.0, "p99": 99.0, "p99_9": 99.9, "max": 100.0}
     if not times_s:
         return dict.fromkeys(shares)
-    found = np.percentile(times_s, [*shares.values()], method="inverted_cdf").tolist()
-    return dict(zip(shares, found, strict=True))
+    found = np.percentile(times_s, [*shares.values()], method="inverted_cdf")
+    return dict(zip(shares, found.round(6).tolist(), strict=True))
 
 
 @dataclass(slots=True)
@@ -166,7 +166,7 @@ class Partner:
         """Returns what came since the last answer, in words."""
         return ", ".join(f"{n} x {what}" for what, n in sorted(self._wrong.items())) or "nothing came"
 
-    def gone(self, error: OSError) -> SimulationStopped:
+    def line_lost(self, error: OSError) -> SimulationStopped:
         """Returns what to raise where the line is gone."""
         reason = error.strerror or str(error) or type(error).__name__
         return SimulationStopped(f"the line to the {self.who} at {self.link.name} is gone: {reason}")
@@ -245,7 +245,7 @@ class WirePartner(Partner):
             self.link.send(frame.encoded())
             answer = self._await(self._comes, began + ANSWER * self.pace.period_s)
         except OSError as error:
-            raise self.gone(error) from None
+            raise self.line_lost(error) from None
         if answer is not None:
             try:
                 values = answer.numbers(self._n_coming)

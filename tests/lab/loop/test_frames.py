@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from wire_line import INTERFACE, Body, robot
 
@@ -30,6 +30,7 @@ from annelid_lab.loop.frames import (
     Kind,
     Role,
     decoded,
+    most_stuffed,
     packed,
     stuffed,
     unstuffed,
@@ -45,13 +46,6 @@ FRAMES = st.builds(
     st.integers(0, 0xFFFF),
     st.one_of(st.binary(max_size=1024), st.integers(250, 258).map(lambda n: b"\x01" * n)),
 )
-
-
-@given(st.binary(max_size=1200))
-def test_stuffed_bytes_have_no_zero_and_come_back(data: bytes) -> None:
-    assert 0 not in stuffed(data)
-    assert unstuffed(stuffed(data)) == data
-    assert len(stuffed(data)) <= len(data) + len(data) // 254 + 1
 
 
 @pytest.mark.parametrize(
@@ -70,6 +64,8 @@ def test_stuffing_by_hand(data: bytes, expected: bytes) -> None:
 
 @given(FRAMES, st.lists(st.integers(1, 40), max_size=30))
 def test_a_frame_comes_back_however_it_is_cut(frame: Frame, cuts: list[int]) -> None:
+    assert 0 not in frame.encoded()[1:-1]
+    assert len(frame.encoded()) <= most_stuffed(MOST_BYTES) + 2
     line, decoder, found = frame.encoded() * 2, Decoder(), []
     for n in [*cuts, len(line)]:
         found += decoder.feed(line[:n])
@@ -85,15 +81,6 @@ def test_a_flipped_bit_is_never_another_frame(frame: Frame, data: st.DataObject)
     line[data.draw(st.integers(0, len(line) - 1))] ^= 1 << data.draw(st.integers(0, 7))
     decoder = Decoder()
     assert list(decoder.feed(bytes(line) + b"\0")) in ([], [frame])
-
-
-@given(st.binary(max_size=5000))
-def test_garbage_raises_nothing_and_fills_no_memory(data: bytes) -> None:
-    decoder = Decoder()
-    for _ in range(3):
-        list(decoder.feed(data))
-    assert len(decoder._held) < 2 * MOST_BYTES
-    assert len(decoder.rejected) <= 17
 
 
 def test_a_long_flood_is_one_wrong_frame() -> None:
@@ -287,13 +274,3 @@ def test_a_python_robot_relaxes_after_silence_and_obeys_again_after_a_new_hello(
     assert peer.receive(Frame(Kind.ACTIVATION, 5, 3, command).encoded()) == b"", "the session that ended"
     peer.receive(Frame(Kind.HELLO, 6, 0, hello).encoded())
     assert peer.receive(Frame(Kind.ACTIVATION, 6, 1, command).encoded())
-
-
-@settings(deadline=None)
-@given(st.lists(st.one_of(st.binary(max_size=60), FRAMES.map(Frame.encoded)), max_size=30))
-def test_a_peer_survives_anything(parts: list[bytes]) -> None:
-    body = Body()
-    peer = robot(body)
-    for part in parts:
-        peer.receive(part)
-    assert all(((each >= 0) & (each <= 1)).all() for each in body.commands)

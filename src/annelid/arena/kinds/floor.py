@@ -9,7 +9,8 @@ from pydantic import Field
 
 from annelid.arena.course import UP
 from annelid.arena.surface import Plane, Surface
-from annelid.config.run import ArenaKind, Post, RunConfig, Walls
+from annelid.config.answers import Post, Walls
+from annelid.config.run import ArenaKind, RunConfig
 from annelid.config.sections import NonNegative, Positive
 
 

@@ -10,8 +10,8 @@ import numpy as np
 from pydantic import Field, field_validator
 
 from annelid.body.mesh import MeshBody
+from annelid.config.answers import Finding
 from annelid.config.kinds import Kind
-from annelid.config.run import Finding
 from annelid.config.sections import PerSegmentOf, Positive, Range
 from annelid.morphology import Array
 from annelid.registry import Registry

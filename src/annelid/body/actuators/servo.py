@@ -13,7 +13,7 @@ from pydantic import Field
 from annelid.body.actuators import ActuatorKind, MotorPower, PerSegment, Slopes
 from annelid.body.estimates import SHRUNK, UNSURE, bearable_force_N, crushes, rhombus_of, weak
 from annelid.body.mesh import MeshBody
-from annelid.config.run import Finding
+from annelid.config.answers import Finding
 from annelid.config.sections import NonNegative, Positive, Range
 from annelid.morphology import Array
 

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 import numpy as np
 
 from annelid.body.mesh import MeshBody, Strands
+from annelid.config.answers import Finding
 from annelid.config.kinds import Kind
-from annelid.config.run import ArenaKind, Finding, RunConfig
+from annelid.config.run import ArenaKind, RunConfig
 from annelid.morphology import Array, MeshGeometry
 from annelid.registry import Registry
 

@@ -1,4 +1,4 @@
-"""A sweep: lines over one field, maps over two, parallel axes over more."""
+"""A sweep: lines over one field, maps over two, lines over each of more."""
 
 from __future__ import annotations
 
@@ -31,30 +31,30 @@ def sweep_figure(data: xr.Dataset, fields: Sequence[str], numbers: Sequence[str]
     """Draws numbers over the varied fields; runs without a number are marked with crosses.
 
     Args:
-        data: The numbers along the fields of a grid or along ``sample``, perhaps along ``repeat``: their mean is drawn,
-            and its 95 % interval over one field.
+        data: The numbers along the fields of a grid or along ``sample``, perhaps along ``repeat``: over one field their
+            mean is drawn with its 95 % interval.
         fields: The varied fields, coordinates of the data.
-        numbers: Variables of the data, at most four; of three or more fields the first only.
+        numbers: Variables of the data. Over three or more fields the first is drawn over each of them.
         stem: Path without suffix; ``.svg`` and ``.png`` are written, and the latter's path is returned.
     """
     if len(fields) > 2:
-        with canvas(3.8) as figure:
-            _parallel(figure, data, fields, numbers[0])
-            return save_both(figure, stem)
-    columns = min(2, len(numbers))
-    rows = ceil(len(numbers) / columns)
-    with canvas(0.5 + _PANEL_IN[1] * rows, _PANEL_IN[0] * columns if len(numbers) > 1 else 4.6) as figure:
-        panels = figure.subplots(rows, columns, squeeze=False).ravel()
-        for i, (axes, name) in enumerate(zip(panels, numbers, strict=False)):
-            if len(fields) == 1:
-                _line(axes, data, fields[0], name)
+        panels = [([field], numbers[0]) for field in fields]
+    else:
+        panels = [(list(fields), name) for name in numbers]
+    columns = min(2, len(panels))
+    rows = ceil(len(panels) / columns)
+    with canvas(0.5 + _PANEL_IN[1] * rows, _PANEL_IN[0] * columns if len(panels) > 1 else 4.6) as figure:
+        places = figure.subplots(rows, columns, squeeze=False).ravel()
+        for i, (axes, (over, name)) in enumerate(zip(places, panels, strict=False)):
+            if len(over) == 1:
+                _line(axes, data, over[0], name)
             else:
-                _map(figure, axes, data, fields, name)
+                _map(figure, axes, data, over, name)
                 if i % columns:
                     axes.set_ylabel("")
-        for axes in panels[len(numbers) :]:
+        for axes in places[len(panels) :]:
             axes.set_visible(False)
-        if any(data[name].isnull().any() for name in numbers):
+        if any(data[name].isnull().any() for _, name in panels):
             figure.supxlabel("×: the run has no such number", fontsize=7.5)
         return save_both(figure, stem)
 
@@ -136,44 +136,6 @@ def _colors(values: np.ndarray) -> dict[str, Any]:
     return {"cmap": SIGNED, "vmin": -reach, "vmax": reach}
 
 
-def _parallel(figure: Figure, data: xr.Dataset, fields: Sequence[str], name: str) -> None:
-    """Draws a line for each run through its values, in the colour of its number; each axis spans its own range."""
-    from matplotlib import colormaps
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import Normalize
-
-    values = _without_repeats(data[name])
-    z = values.values.ravel()
-    # On a grid each run's values are those at its place; in samples all fields lie along the samples already.
-    places = np.indices(values.shape).reshape(values.ndim, -1)
-    known = np.isfinite(z)
-    low, high = (float(z[known].min()), float(z[known].max())) if known.any() else (0.0, 1.0)
-    norm = Normalize(low, high if high > low else low + 1.0)
-    label = quantity(values, 24)
-    axes = figure.subplots()
-    shares = []
-    behind = {"facecolor": "white", "edgecolor": "none", "pad": 1.0, "alpha": 0.8}
-    at: dict[str, Any] = {"textcoords": "offset points", "fontsize": 7.5, "va": "center", "zorder": 4, "bbox": behind}
-    for i, field in enumerate(fields):
-        scale, ticks = _axis(data[field].values)
-        column = scale[places[values.dims.index(data[field].dims[0])]]
-        shares.append(_share(column))
-        for value, text in ticks or [(end, f"{end:.4g}") for end in (column.min(), column.max())]:
-            axes.annotate(text, (i, _share(np.append(column, value))[-1]), (4, 0), **at)
-    lines = np.array([*shares, norm(z)], dtype=float).T
-    for i in np.argsort(np.nan_to_num(z, nan=-np.inf)):
-        color: Any = colormaps[COLORS](norm(z[i])) if known[i] else _FAILED
-        width, alpha = (0.9, 0.8) if known[i] else (0.5, 0.5)
-        axes.plot(range(len(lines[i])), lines[i], color=color, linewidth=width, alpha=alpha)
-    axes.set_xticks(range(len(fields) + 1), [*(_label(data[field]) for field in fields), label])
-    axes.set_yticks([])
-    axes.set_xlim(-0.2, len(fields) + 0.05)
-    axes.spines[["left", "bottom"]].set_visible(False)
-    for i in range(len(fields) + 1):
-        axes.axvline(i, color="0.3", linewidth=0.8, zorder=3)
-    figure.colorbar(ScalarMappable(norm, COLORS), ax=axes, pad=0.01, label=label)
-
-
 def _without_repeats(values: xr.DataArray) -> xr.DataArray:
     return values.mean("repeat", keep_attrs=True) if "repeat" in values.dims else values
 
@@ -206,11 +168,6 @@ def _is_logarithmic(values: np.ndarray) -> bool:
     """Whether values over a decade are spread evenly by ratio rather than by difference."""
     low, middle, high = np.min(values), np.median(values), np.max(values)
     return bool(high > 10.0 * low and abs(np.log(middle**2 / (low * high))) < abs(np.log(2.0 * middle / (low + high))))
-
-
-def _share(values: np.ndarray) -> np.ndarray:
-    low, high = values.min(), values.max()
-    return (values - low) / (high - low) if high > low else np.full(len(values), 0.5)
 
 
 def _label(coordinate: xr.DataArray) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 
 from annelid.analysis.track import Track, track_of
 from annelid.config import RunConfig
-from annelid.config.run import Goals
+from annelid.config.answers import Goals
 from annelid.draw.canvas import WIDTH_IN, canvas, panel_title, save
 from annelid.draw.figures import RUN_FIGURES
 from annelid.draw.plots import plot_path

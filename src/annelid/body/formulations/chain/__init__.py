@@ -11,7 +11,8 @@ from pydantic import Field
 from annelid.body.estimates import rhombus_of, softened
 from annelid.body.formulations import FormulationKind
 from annelid.body.mesh import MeshBody
-from annelid.config.run import ArenaKind, Finding, RunConfig
+from annelid.config.answers import Finding
+from annelid.config.run import ArenaKind, RunConfig
 from annelid.config.sections import Impedance, NonNegative, Positive
 from annelid.morphology import MeshGeometry
 

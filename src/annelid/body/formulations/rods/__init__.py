@@ -9,7 +9,8 @@ from pydantic import Field
 
 from annelid.body.formulations import BDF2_SHARE, FormulationKind, Tie
 from annelid.body.mesh import MeshBody
-from annelid.config.run import ArenaKind, Finding, RunConfig
+from annelid.config.answers import Finding
+from annelid.config.run import ArenaKind, RunConfig
 from annelid.config.sections import Positive
 from annelid.morphology import MeshGeometry
 

@@ -1,99 +1,32 @@
-"""A worm that runs while it is watched: changed, poked and started anew; and what is remembered of it, or of a run."""
+"""A worm that runs while it is watched: changed, poked and started anew."""
 
 from __future__ import annotations
 
-from bisect import bisect_left, bisect_right
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from operator import attrgetter, itemgetter
+from collections.abc import Mapping
 from time import perf_counter
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from annelid.body.worm import worm_of
 from annelid.config import Knob, RunConfig, load_config
-from annelid.draw.scene import postures_of
+from annelid.live.history import History, Moment, signal_names
 from annelid.morphology import Array
 from annelid.protocols import Records
 from annelid.simulation.adjust import adjusted
-from annelid.simulation.runfile import Run
 from annelid.simulation.stepping import Simulation, build_controller, start
 from annelid.simulation.worm import WormPlant
 
-KEEP_BYTES = 200_000_000  # a live view forgets the oldest postures beyond this
-KEEP_S = 600.0  # and the oldest of anything, in simulated time
 ENDLESS_S = 1e7  # a live worm runs until the view ends; its configuration keeps the duration that it has
 SAMPLE_S = 0.01  # signals for the plots are kept at most this often, in simulated time
 POKE_S = 0.15  # how long a poke lasts, in simulated time
 POKE_RADIUS_M = 0.06
 """Distance from the middle of a poke at which its force has fallen to 0.6, as under the flat of a hand."""
-_TRIM_EVERY = 64
-_time_of = attrgetter("time_s")
 _LEAST_FRICTION = 0.01
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Moment:
-    """A worm at one instant."""
-
-    time_s: float
-    qpos: NDArray[np.floating]  # generalised positions, (nq,)
-    activation: NDArray[np.floating]  # of every ring muscle, in [0, 1], (n_muscles,)
-    contact_force_N: NDArray[np.floating]  # of the ground on every segment, (n_segments, 3)
-
-
-class Reel:
-    """Moments in the order of time, and samples of signals between them.
-
-    The signals are named after neurons (mV), then ``activation_1`` .. of the muscles.
-    """
-
-    def __init__(self, names: Sequence[str]) -> None:
-        self.names = tuple(names)
-        self._moments: list[Moment] = []
-        self._samples: list[tuple[float, NDArray[np.floating]]] = []
-
-    @property
-    def span_s(self) -> tuple[float, float]:
-        """Times of the first and the last moment kept, s."""
-        return self._moments[0].time_s, self._moments[-1].time_s
-
-    def add(self, moment: Moment) -> None:
-        """Adds a moment later than all others."""
-        self._moments.append(moment)
-
-    def add_sample(self, time_s: float, values: NDArray[np.floating]) -> None:
-        """Adds the signals of an instant later than all others, ``(n_signals,)``."""
-        self._samples.append((time_s, values))
-
-    def forget(self) -> None:
-        """Drops the oldest moments and samples that there is no room for."""
-        most = max(2, KEEP_BYTES // max(1, self._moments[-1].qpos.nbytes))
-        too_old = bisect_left(self._moments, self._moments[-1].time_s - KEEP_S, key=_time_of)
-        excess = max(len(self._moments) - most, too_old)
-        if excess >= _TRIM_EVERY:
-            del self._moments[:excess]
-            del self._samples[: bisect_left(self._samples, self._moments[0].time_s, key=itemgetter(0))]
-
-    def at(self, time_s: float) -> Moment:
-        """Returns the last moment that is not after a time, or the first one."""
-        return self._moments[max(0, bisect_right(self._moments, time_s + 1e-9, key=_time_of) - 1)]
-
-    def window(self, first_s: float, last_s: float, most: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Returns times, s, ``(n,)``, and signals, ``(n, n_signals)``, of a stretch of time, evenly thinned."""
-        start = bisect_left(self._samples, first_s, key=itemgetter(0))
-        stop = bisect_right(self._samples, last_s + 1e-9, key=itemgetter(0))
-        every = max(1, -(-(stop - start) // most))
-        # On the same samples from one call to the next, or the curves would shimmer.
-        taken = self._samples[start + -start % every : stop : every]
-        values = np.array([sample for _, sample in taken], dtype=np.float64).reshape(-1, len(self.names))
-        return np.array([time for time, _ in taken]), values
-
-
-class LivingWorm:
-    """Body and nervous system of a 3D worm from time zero on, and a reel of what is remembered of them."""
+class LiveWorm:
+    """Body and nervous system of a 3D worm from time zero on, and a history of what is remembered of them."""
 
     def __init__(self, config: RunConfig) -> None:
         self._first = self.config = config
@@ -119,11 +52,11 @@ class LivingWorm:
         self._poke_ends_s = -1.0
         self._next_sample_s = 0.0
         neurons = controller.recordable().coords.get("neuron", ()) if isinstance(controller, Records) else ()
-        self.reel = Reel(signal_names(map(str, neurons), plant.n_muscles))
-        self._remember_signals()
-        self._remember()
+        self.history = History(signal_names(map(str, neurons), plant.n_muscles))
+        self._record_signals()
+        self._record()
 
-    def as_at_first(self) -> None:
+    def reset_fields(self) -> None:
         """Gives all fields the values that the worm came with; it goes on from where it is."""
         self._take(self._first)
 
@@ -152,9 +85,9 @@ class LivingWorm:
                 self.plant.push(np.zeros((self.plant.geometry.n_crossings, 3)))
             self.simulation.advance()
             if self.time_s >= self._next_sample_s:
-                self._remember_signals()
+                self._record_signals()
         if self.simulation.step > begun:
-            self._remember()
+            self._record()
 
     def poke(self, place_m: Array, force_N: Array) -> None:
         """Pushes the skin about a place in the model's axes, m, for a short time; its crossings share the force."""
@@ -163,40 +96,16 @@ class LivingWorm:
         self.plant.push((share / share.sum())[:, np.newaxis] * force_N)
         self._poke_ends_s = self.time_s + POKE_S
 
-    def _remember(self) -> None:
+    def _record(self) -> None:
         plant, now = self.plant, self.simulation
         kept = (plant.qpos, now.activation, now.sensation.contact_force_N)
-        self.reel.add(Moment(self.time_s, *(array.astype(np.float32) for array in kept)))
-        self.reel.forget()
+        self.history.add(Moment(self.time_s, *(array.astype(np.float32) for array in kept)))
 
-    def _remember_signals(self) -> None:
+    def _record_signals(self) -> None:
         controller = self.simulation.controller
         potential = controller.read(False).get("potential", ()) if isinstance(controller, Records) else ()
-        self.reel.add_sample(self.time_s, np.concatenate([np.asarray(potential), self.simulation.activation]))
+        self.history.add_sample(self.time_s, np.concatenate([np.asarray(potential), self.simulation.activation]))
         self._next_sample_s = self.time_s + SAMPLE_S
-
-
-def signal_names(neurons: Iterable[str], n_muscles: int) -> tuple[str, ...]:
-    """Names of a reel's signals."""
-    return (*neurons, *(f"activation_{muscle + 1}" for muscle in range(n_muscles)))
-
-
-def reel_of(run: Run, n_coordinates: int) -> Reel:
-    """Returns the moments and signals that a run of a 3D worm, a body of so many coordinates, has recorded."""
-    data, qpos = run.data, postures_of(run, n_coordinates)
-    neurons = [str(name) for name in data["neuron"].values] if "potential" in data else []
-    activation = data["activation"].values
-    reel = Reel(signal_names(neurons, activation.shape[1]))
-    times = data["time"].values
-    signals = np.concatenate([data["potential"].values, activation], axis=1) if neurons else activation
-    for time, values in zip(times, signals, strict=True):
-        reel.add_sample(float(time), values)
-    frame_times = data["frame_time"].values
-    sample = np.clip(np.searchsorted(times, frame_times + 1e-9, side="right") - 1, 0, None)
-    force = data["contact_force"].values
-    for frame, time in enumerate(frame_times):
-        reel.add(Moment(float(time), qpos[frame], activation[sample[frame]], force[sample[frame]]))
-    return reel
 
 
 def knobs_of(config: RunConfig) -> tuple[Knob, ...]:

@@ -18,7 +18,7 @@ GROUPS_SEEN = 3
 """Geoms of a higher group the engine's viewers do not show either."""
 
 
-class Things:
+class SceneGeoms:
     """The geoms of a compiled scene that are drawn, below a node of the viewer; none where there is no scene."""
 
     def __init__(

@@ -1,0 +1,118 @@
+"""Run files of older versions open, and say what acted in them and is gone."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from functools import reduce
+from operator import getitem
+from pathlib import Path
+from typing import Any
+
+import pytest
+import xarray
+from toy import SavedToyPlant, ToyController, toy_config, without_digest
+
+from annelid.config import RunConfig, load_config
+from annelid.simulation import open_run, simulate
+from annelid.simulation.runfile import migrated, read_config, verify_run
+
+NEWER_THAN_0_1 = {
+    "": ["turning", "published"],
+    "body": ["heading_deg", "joints"],
+    "body.strands": ["damping_time_s"],
+    "body.springs": ["sensors"],
+    "body.rings": ["kind"],
+    "body.formulation": [
+        "pins",
+        "pin_stiffness_N_per_m",
+        "pin_damping_Ns_per_m",
+    ],
+    "arena": ["kind", "backward_friction", "slope_deg", "rail_gap_m", "posts"],
+    "guard": ["depth_m"],
+}
+
+
+def test_a_file_of_annelid_0_1_is_read(tmp_path: Path) -> None:
+    run = simulate(toy_config(), tmp_path / "run", plant=SavedToyPlant(), controller=ToyController())
+    config = load_config({"body": {"kind": "worm"}, "arena": {"friction": 0.4}})
+    tree = config.model_dump(mode="json")
+    for path, fields in NEWER_THAN_0_1.items():
+        section = reduce(getitem, filter(None, path.split(".")), tree)
+        for field in fields:
+            del section[field]
+    tree["body"]["strands"]["joint_damping_Nms_per_rad"] = 0.07
+    shutil.copy(run.path, tmp_path)
+    with without_digest(tmp_path / "run.nc") as file:
+        del file["warnings"], file["cpu_time"]
+        file.attrs["config"] = json.dumps(tree)
+    old = open_run(tmp_path / "run.nc")
+    assert old.config == read_config(tmp_path / "run.nc") == config
+    assert (old.status, old.cpu_time_s) == (run.status, 0.0)
+    assert [doubt.startswith("body.strands.joint_damping_Nms_per_rad was 0.07") for doubt in old.warnings] == [True]
+    xarray.testing.assert_equal(old.data, run.data)
+    assert "older version" in verify_run(tmp_path / "run.nc")
+
+
+def test_the_name_decided_what_is_published_up_to_schema_1(subtests: pytest.Subtests) -> None:
+    for name, published in (
+        ("riddle2023", "riddle2023"),
+        ("riddle2023-rods", "riddle2023"),
+        ("wang", "wang"),
+        ("wang-2", None),
+        ("riddle2022-planar", "riddle2022"),
+        ("riddle2025", None),
+        ("mine", None),
+    ):
+        with subtests.test(f"{name!r:.60}"):
+            tree = load_config({"name": name}).model_dump(mode="json")
+            assert tree.pop("published") is None
+            for schema in (0, 1):
+                old = xarray.Dataset(attrs={"schema_version": schema, "config": json.dumps(tree)})
+                assert RunConfig.model_validate_json(migrated(old).attrs["config"]).published == published
+            new = xarray.Dataset(attrs={"schema_version": 2, "config": json.dumps(tree)})
+            assert migrated(new).attrs["config"] == json.dumps(tree)
+
+
+PRESSURE = {"body": {"kind": "worm"}, "controller": {"kind": "sns-pressure"}}
+RODS = {"extends": "riddle2023-rods"}
+SOFT = {**RODS, "body": {"formulation": {"pins": "separate"}}}
+ROUGH = {**RODS, "arena": {"kind": "rough"}}
+POSTS = {**RODS, "arena": {"kind": "floor", "posts": [[1.0, 2.0, 0.1]]}}
+
+
+@pytest.mark.parametrize(
+    ("worm", "schema", "gone", "says"),
+    [
+        (PRESSURE, 2, {"controller.landing": 0.0, "guard.stretch": 1.1}, None),
+        (PRESSURE, 2, {"controller.landing": 0.1}, "controller.landing was 0.1"),
+        (RODS, 3, {"body.formulation.pin_inertance_kg": 0.0094}, None),
+        (SOFT, 3, {"body.formulation.pin_inertance_kg": 0.0094}, "pin_inertance_kg was 0.0094"),
+        (RODS, 3, {"body.formulation.lateral_damping_Nms_per_rad": 0.1}, "lateral_damping_Nms_per_rad was 0.1"),
+        (RODS, 5, {"body.formulation.solver_iterations": 100}, "solver_iterations was 100"),
+        (ROUGH, 5, {"arena.posts": None, "arena.rail_gap_m": None}, None),
+        (POSTS, 5, {"body.formulation.solver_tolerance": None}, None),
+        (ROUGH, 5, {"arena.posts": [[1.0, 2.0, 0.1]]}, "arena.posts was"),
+    ],
+)
+def test_a_run_in_which_a_field_acted_that_is_gone_says_so(
+    worm: dict[str, Any], schema: int, gone: dict[str, Any], says: str | None
+) -> None:
+    config = load_config(worm)
+    tree = config.model_dump(mode="json")
+    for path, value in gone.items():
+        *sections, field = path.split(".")
+        reduce(getitem, sections, tree)[field] = value
+    attrs = {"schema_version": schema, "config": json.dumps(tree)}
+    read = migrated(xarray.Dataset({"warnings": ((), "it was cold")}, attrs=attrs))
+    assert RunConfig.model_validate_json(read.attrs["config"]) == config
+    first, *doubts = str(read["warnings"].values).splitlines()
+    assert first == "it was cold"
+    assert len(doubts) == (says is not None)
+    assert says is None or says in doubts[0]
+
+
+def test_what_is_wrong_with_an_old_configuration_is_left_to_its_reader(subtests: pytest.Subtests) -> None:
+    for config in ("{", "[]", '"riddle2023"', '{"name": 3}', "[" * 100_000):
+        with subtests.test(f"{config!r:.60}"):
+            assert migrated(xarray.Dataset(attrs={"config": config})).attrs["config"] == config

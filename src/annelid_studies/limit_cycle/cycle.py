@@ -312,16 +312,16 @@ def _first_return(flow: Flow, state: Array, before: Switches, section: Section, 
     """
     here = Copies.at(flow, state, before)
     time, states, switches, moved = [0.0], [here.state[0]], [here.switches[0]], []
-    met = False
-    while not met:
+    reached = False
+    while not reached:
         if time[-1] * flow.timestep_s > longest_s:
             raise NoLimitCycle(
                 f"{flow.labels[section.state]} does not rise through {section.threshold:g} within {longest_s:g} s: "
                 "choose another threshold or neuron, or a worm that oscillates"
             )
         there, taken = advance(flow, here, np.ones(1))
-        met = bool(here.state[0, section.state] < section.threshold <= there.state[0, section.state])
-        if met:
+        reached = bool(here.state[0, section.state] < section.threshold <= there.state[0, section.state])
+        if reached:
             there, taken = _stop(flow, section, here, taken)
         elif (there.switches != here.switches).any():
             moved.append(len(time))

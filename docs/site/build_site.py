@@ -21,6 +21,7 @@ import command_reference
 import configuration_reference
 import examples_page
 import notebooks
+import numbers_reference
 import run_file_reference
 from navigation import expanded
 
@@ -31,6 +32,7 @@ GENERATED = {
     "examples.md": lambda: examples_page.page(ROOT / "examples"),
     "reference/commands.md": command_reference.page,
     "reference/configuration.md": configuration_reference.page,
+    "reference/numbers.md": numbers_reference.page,
     "reference/run_file.md": run_file_reference.page,
 }
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from difflib import SequenceMatcher, get_close_matches
+from difflib import get_close_matches
 from math import isfinite
 from numbers import Real
 from typing import Any
@@ -147,17 +146,13 @@ def suggest(name: str, valid: Iterable[str]) -> str:
 def nearest(name: str, valid: Sequence[str]) -> str | None:
     """Returns the valid name that is most like one, or like the last part of its path; None if none is like it.
 
-    Of names that are equally like it, the one whose letters are the same comes first: two were swapped.
-
     Args:
         name: What the user wrote.
         valid: The names that exist.
     """
     for part in (name[:MOST_SHOWN], name[:MOST_SHOWN].rsplit(".", 1)[-1]):
-        if near := get_close_matches(part, valid, cutoff=0.5):
-            letters = Counter(part)
-            likeness = {one: SequenceMatcher(a=one, b=part).ratio() for one in near}
-            return max(near, key=lambda one: (round(likeness[one], 6), -(letters - Counter(one)).total()))
+        if near := get_close_matches(part, valid, n=1, cutoff=0.5):
+            return near[0]
     return None
 
 

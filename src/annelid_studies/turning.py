@@ -119,6 +119,7 @@ class Reading:
     turn_deg_per_cycle: float  # Change of the heading
     curvature_per_m: float  # The same over the path
     radius_m: float  # Radius of the circle; infinite for a straight path
+    roll_deg: float  # Farthest that the body rolled about its length since the start, positive where its left side rose
     command: str  # The command line that makes the run
 
 
@@ -151,6 +152,7 @@ def turning(
                 turn_deg_per_cycle=math.degrees(turn.angle_rad) / turn.cycles,
                 curvature_per_m=turn.curvature_per_m,
                 radius_m=turn.radius_m,
+                roll_deg=math.degrees(track.roll_rad[np.abs(track.roll_rad).argmax()]),
                 command=case.command,
             )
         )
@@ -175,12 +177,13 @@ def turning_table(readings: Sequence[Reading]) -> TerminalTable:
         "speed (m/s)": lambda one: f"{one.speed_m_per_s:.3f}",
         "deg a cycle": lambda one: f"{one.turn_deg_per_cycle:.1f}",
         "radius (m)": lambda one: f"{one.radius_m:.2f}",
+        "rolled (deg)": lambda one: f"{one.roll_deg:.0f}",
     }
     return terminal_table(tabulated(readings, columns), "Turning")
 
 
 def turning_picture(readings: Sequence[Reading], tracks: Sequence[Track], stem: Path) -> Path:
-    """Draws curvature and radius of every gait against modulation, and the tracks of the second gait.
+    """Draws curvature and radius of every gait against modulation, and the tracks of the last gait.
 
     The tracks are the middles of the body, every one from the same start, with the outline at the end.
     """
@@ -189,7 +192,7 @@ def turning_picture(readings: Sequence[Reading], tracks: Sequence[Track], stem: 
         for gait, own in grouped(readings, lambda one: one.gait).items()
     }
     radii = {gait: (x, 1.0 / np.maximum(np.abs(bend), 1e-9)) for gait, (x, bend) in curvatures.items()}
-    shown = list(curvatures)[min(1, len(curvatures) - 1)]
+    shown = list(curvatures)[-1]
     pairs = zip(readings, tracks, strict=True)
     of_shown = {one.modulation: track for one, track in pairs if one.gait == shown}
     with canvas(5.6) as figure:
@@ -208,8 +211,8 @@ def turning_picture(readings: Sequence[Reading], tracks: Sequence[Track], stem: 
             from_above.plot(*(track.outline_m(-1) - start).T, **look, linewidth=0.6)
         from_above.set_aspect("equal")
         from_above.set(xlabel="x (m)", ylabel="y (m)")
-        from_above.legend(title="modulation", loc="upper left", ncols=2)
-        panel_title(from_above, f"Tracks, outlines at the end: {shown}")
+        from_above.legend(title="modulation", loc="upper center", bbox_to_anchor=(0.5, -0.28), ncols=4)
+        panel_title(from_above, f"{shown}: tracks")
         handles, labels = curvature.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
         return save_both(figure, stem)

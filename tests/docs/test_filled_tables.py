@@ -84,13 +84,10 @@ STALE: tuple[str, ...] = (
     "riddle2025.csv",
     "robustness_three_segments.json",
     "slip.csv",
-    "slip_detector.csv",
     "speed.csv",
     "tolerance_windows.csv",
     "tune_sns.csv",
     "tune_timed.csv",
-    "turning.csv",
-    "uncertainty_rods.csv",
     "uncertainty_turns.csv",
     "weak_middle.csv",
 )

@@ -10,10 +10,9 @@ from typing import Any, Literal, get_args, get_origin
 
 import pytest
 
-from annelid.config import RunConfig, Section, load_config, parse_assignments
+from annelid.config import RunConfig, Section, load_config
 from annelid.config.checking import field_paths, sections_in
 from annelid.errors import ConfigError
-from annelid.textfiles import toml_value
 
 EXISTING = set(field_paths()) | {"body", "arena", "controller", "turning", "sensor", "clock", "record", "guard"}
 HUGE = 10**5000
@@ -127,18 +126,3 @@ def test_the_engine_refuses_nothing_that_the_configuration_takes(base: str, size
         with warnings.catch_warnings(), suppress(ConfigError):
             warnings.simplefilter("ignore")
             mjcf_text(load_config(base, {"body.mesh.elements_per_side": 1, path: size}))
-
-
-def test_what_is_set_on_the_command_line_is_what_was_written() -> None:
-    for value in (
-        1e16,
-        0.1,
-        1000.0,
-        -0.0,
-        True,
-        "🪱",
-        'a "b" \\ \x7f\n',
-        [[0.1, 2.0], []],
-        {"a b": 1, "🪱": {"x": [1.5]}},
-    ):
-        assert parse_assignments([f"field={toml_value(value)}"]) == {"field": value}

@@ -40,19 +40,16 @@ def test_an_engine_over_another_is_seen(tmp_path: Path, monkeypatch: pytest.Monk
     assert "3.17.0" in engine.line()
 
 
-@pytest.mark.parametrize("content", ["", "aaaa"], ids=["metapackage without files", "the same files"])
-def test_what_does_no_harm_is_let_be(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, content: str) -> None:
-    install(tmp_path, "mujoco-core", "4.0.1", "aaaa")
-    install(tmp_path, "mujoco", "4.0.1", content)
-    monkeypatch.syspath_prepend(tmp_path)
-    assert mixed_engine() is None
-
-
-def test_other_folders_do_not_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    ("folder", "version", "content"), [("one", "4.0.1", ""), ("one", "4.0.1", "aaaa"), ("other", "3.17.0", "bbbb")]
+)
+def test_no_files_the_same_files_and_other_folders_do_no_harm(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, folder: str, version: str, content: str
+) -> None:
     install(tmp_path / "one", "mujoco-core", "4.0.1", "aaaa")
-    install(tmp_path / "other", "mujoco", "3.17.0", "bbbb")
+    install(tmp_path / folder, "mujoco", version, content)
     monkeypatch.syspath_prepend(tmp_path / "one")
-    monkeypatch.syspath_prepend(tmp_path / "other")
+    monkeypatch.syspath_prepend(tmp_path / folder)
     assert mixed_engine() is None
 
 

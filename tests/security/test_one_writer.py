@@ -129,7 +129,6 @@ def test_a_folder_that_cannot_be_made_is_said_to_be_one() -> None:
     "words",
     [
         ("study", "limit-cycle", "-o", "no/a.png"),
-        ("export", "--to", "mjcf", "riddle2023-rods", "-o", "no/a.xml"),
         ("study", "limit-cycle", "-o", "closed/a.png"),
     ],
 )

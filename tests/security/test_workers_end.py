@@ -101,13 +101,6 @@ def left_after(process: subprocess.Popen[str], number: signal.Signals) -> tuple[
     return [str(one) for one in left], time.monotonic() - began
 
 
-@pytest.mark.slow
-def test_workers_end_with_a_killed_sweep(tmp_path: Path) -> None:
-    with sweeping(tmp_path) as process:
-        left, _ = left_after(process, signal.SIGKILL)
-        assert left == []
-
-
 def test_sigterm_ends_a_sweep_as_ctrl_c_does_and_it_opens_no_port(tmp_path: Path) -> None:
     with sweeping(tmp_path) as process:
         ports = [one for part in processes_of(process.pid) for one in part.net_connections()]

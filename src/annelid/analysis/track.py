@@ -86,6 +86,20 @@ class Track:
         ahead = self.front_m - self.ring_centre(-1)
         return np.unwrap(np.arctan2(-ahead[:, 1], -ahead[:, 0]))
 
+    @cached_property
+    def roll_rad(self) -> Array:
+        """Roll about the body's length since the start, unwrapped, ``(n,)``: positive where its left side rises."""
+        planes = self.crossing_m.reshape(len(self.time_s), -1, self.n_per_plane, 3)
+        centre = planes.mean(axis=2)
+        ahead = centre[:, self.ring_planes[0]] - centre[:, self.ring_planes[-1]]
+        left = np.cross([0.0, 0.0, 1.0], ahead)
+        up = np.cross(ahead, left)
+        axes = np.stack([each / np.linalg.norm(each, axis=1, keepdims=True) for each in (left, up)], axis=1)
+        # Of every crossing about the centre of its plane.
+        across = np.einsum("tpkx,tax->tapk", planes - centre[:, :, np.newaxis], axes)
+        turned = across[:, 0] + 1j * across[:, 1]
+        return np.unwrap(np.angle((turned * turned[0].conj()).sum(axis=(1, 2))))
+
     def ring_centre(self, segment: int) -> Array:
         """Centre of a segment's ring, seen from above, ``(n, 2)``; segments from 0, negative ones from the rear."""
         return self._planes[:, self.ring_planes[segment]].mean(axis=1)

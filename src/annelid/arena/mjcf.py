@@ -24,7 +24,7 @@ MOST_OBJECTS = 16
 _LARGEST, _MOST_ITERATIONS = 1e6, 1e4
 """Of any number: beyond it nothing is a length, a mass or a stiffness in SI units. More iterations would take hours."""
 _LARGEST_OF = {"young": 1e12, "shear": 1e12, "sdf_initpoints": _MOST_ITERATIONS}
-_GRIDS = ("nrow", "ncol", "width", "height", "cellcount", "nsample", "actdim")
+_GRIDS = ("nrow", "ncol", "width", "height", "nchannel", "cellcount", "nsample", "actdim")
 """Attributes whose product is an amount of memory."""
 _LOOKS = frozenset(["visual", "statistic", "size", "light", "camera", "custom"])
 """Elements that are left out: pictures have light and views of their own, and the engine finds the sizes itself."""

@@ -13,7 +13,7 @@ from annelid.config.run import ControllerKind, RunConfig
 from annelid.control.base import SegmentController
 from annelid.control.circuit import SENSED, Circuit, InputTable, lengthening_m
 from annelid.errors import ConfigError
-from annelid.nervous import GapJunction, NetworkState, Stepper
+from annelid.nervous import GapJunction, Network, NetworkState, Stepper
 from annelid.protocols import Array, Plant, Sensation, State, Values
 
 
@@ -76,6 +76,11 @@ class CircuitController(SegmentController):
     def senses(self) -> tuple[str, ...]:
         """What it senses, names in `annelid.control.SENSED`."""
         return self.circuit.senses
+
+    @property
+    def network(self) -> Network:
+        """The network that it steps."""
+        return self.circuit.network
 
     @property
     def potential_mV(self) -> Array:

@@ -32,7 +32,7 @@ MESSAGE_BYTES = 512
 WARNINGS = "warnings"
 WARNING_BYTES = 8192
 SCHEMA = "schema_version"
-SCHEMA_VERSION = 6
+SCHEMA_VERSION = 7
 """Of the file's names and their meanings; a change that an older reader would take for something else raises it, and
 `migrated` brings older files up to it. Files of annelid 0.1 say none, which counts as 0."""
 CHECKED_ON_OPENING_BYTES = 64_000_000
@@ -137,7 +137,7 @@ def migrated(data: xarray.Dataset) -> xarray.Dataset:
     Files of schema 0, those of annelid 0.1, have neither warnings nor processor time. Their configuration is valid as
     it is: fields that are newer default to what 0.1 did, guards excepted. Signals that 0.1 did not record stay absent.
     Up to schema 1 the name of a configuration decided which published numbers its runs were compared with. Up to schema
-    5 there were fields that are gone (`annelid.config.REPLACED`); a run in which one acted says so among its warnings.
+    6 there were fields that are gone (`annelid.config.REPLACED`); a run in which one acted says so among its warnings.
     """
     if data.attrs.get(SCHEMA, 0) < 1:
         added = {WARNINGS: ((), ""), CPU_TIME: ((), 0.0)}

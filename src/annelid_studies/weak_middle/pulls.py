@@ -30,8 +30,8 @@ BASE_WORM: dict[str, Any] = {
 springs of the authors' models, none of them tuned to its elongations, and servos of which one alone moves an end as the
 robot's."""
 RESOLUTION: dict[str, Any] = {
-    "clock.control_timestep_s": 0.02,
-    "clock.physics_timestep_s": 0.02,
+    "clock.control_timestep_s": 0.01,
+    "clock.physics_timestep_s": 0.01,
     "record.signals_interval_s": 0.02,
     "record.frames_interval_s": 4.0,
 }
@@ -239,7 +239,7 @@ def settings(
     """
     found = {}
     for key, readings in _search(store, worms, length_limited, guesses_m, _next_lengths).items():
-        if _next_lengths(readings):
+        if _error(*nearest(readings)) > LARGEST_ERROR_M:
             changes = ", ".join(f"{field} = {value:g}" for field, value in worms[key].items())
             raise ConfigError(
                 f"with {changes or 'the base worm'} no cable length was found at which an end elongates by "
@@ -282,7 +282,10 @@ def _search(
 def _next_lengths(readings: Readings) -> Sequence[float]:
     if _error(*nearest(readings)) <= LARGEST_ERROR_M:
         return ()
-    return [next_length(readings)] if len(readings) > 1 else GUESSES_M
+    if len(readings) < 2:
+        return GUESSES_M
+    # A secant takes two readings that count.
+    return [next_length(readings)] if sum(not one.problem for one in readings.values()) > 1 else ()
 
 
 def _next_forces(readings: Readings) -> Sequence[float]:

@@ -103,11 +103,11 @@ BASE = {"segments": 4.0, "stiffness": 2.0, "weight": 1.87, "friction": 0.7}
 BASE_KEY: Key = ("base", 0.0)
 
 CHECKS: Mapping[str, dict[str, Any]] = {
-    "half the step": {"clock.control_timestep_s": 0.01, "clock.physics_timestep_s": 0.01},
+    "half the step": {"clock.control_timestep_s": 0.005, "clock.physics_timestep_s": 0.005},
     "four elements a side, half the step": {
         "body.mesh.elements_per_side": 4,
-        "clock.control_timestep_s": 0.01,
-        "clock.physics_timestep_s": 0.01,
+        "clock.control_timestep_s": 0.005,
+        "clock.physics_timestep_s": 0.005,
     },
 }
 """Resolutions at which some readings are taken again."""

@@ -30,7 +30,7 @@ ENTRY_SHOWN_M, EXIT_SHOWN_M = 0.15, 1.2
 """How much is drawn of what goes on for ever: behind the worm's rear, and beyond the last change."""
 GRAIN_M, AROUND = 0.03, 48
 """Of the triangles that are drawn: their length, and how many edges are round the pipe."""
-PANEL_LENGTH_M = 0.05
+PANEL_LENGTH_M, PANELS_AROUND = 0.05, 32
 HALF_THICKNESS_M = 0.01
 
 
@@ -151,8 +151,8 @@ class Pipe(ArenaKind):
         rings = centre[:, np.newaxis] + wall.bore.at(arc)[0][:, np.newaxis, np.newaxis] * across
         return Shape(rings.reshape(-1, 3), grid_faces(len(arc), AROUND, closed=True))
 
-    def add_panels(self, spec: mujoco.MjSpec, length_m: float, around: int = 32) -> None:
-        """Adds flat panels that are tangent to the wall in their middles, a number of them around; none is drawn."""
+    def add_panels(self, spec: mujoco.MjSpec, length_m: float) -> None:
+        """Adds flat panels that are tangent to the wall in their middles; none is drawn."""
         from annelid.arena.geoms import add_box
 
         wall, (first, last) = self.ground(), self._shown(length_m)
@@ -160,7 +160,7 @@ class Pipe(ArenaKind):
         arc = first + (np.arange(n_rings) + 0.5) * (last - first) / n_rings
         centre, side, up = frames_along(wall.course, arc)
         foot, radius = wall.course.at(arc), wall.bore.at(arc)[0]
-        for angle in 2.0 * pi * np.arange(around) / around:
+        for angle in 2.0 * pi * np.arange(PANELS_AROUND) / PANELS_AROUND:
             outwards = np.cos(angle) * side + np.sin(angle) * up
             # A ring's panels are longer on the outer side of a curve.
             stretch = 1.0 - radius * (outwards * foot.curvature_per_m).sum(axis=-1)
@@ -171,7 +171,7 @@ class Pipe(ArenaKind):
                 ahead = along - (along @ facing) * facing
                 ahead = ahead / np.linalg.norm(ahead)
                 axes = np.stack([ahead, np.cross(facing, ahead), facing], axis=-1)
-                size = [half, own * tan(pi / around), HALF_THICKNESS_M]
+                size = [half, own * tan(pi / PANELS_AROUND), HALF_THICKNESS_M]
                 add_box(spec, self, place - HALF_THICKNESS_M * facing, size, axes)
 
     def _shown(self, length_m: float) -> tuple[float, float]:

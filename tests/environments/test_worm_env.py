@@ -1,4 +1,4 @@
-"""One worm as an environment: what it tells, what it rewards, how it ends, and that seeds decide it all."""
+"""One worm as an environment: what is observed, what is rewarded, how it ends, and that seeds decide it all."""
 
 from __future__ import annotations
 
@@ -38,12 +38,12 @@ def wave(k: int, n: int) -> np.ndarray:
 
 def rollout(env: WormEnv, n_steps: int, seed: int, actions: np.random.Generator) -> list[Any]:
     """All that an environment returns, through as many episodes as it takes."""
-    told: list[Any] = [env.reset(seed=seed)]
+    returned: list[Any] = [env.reset(seed=seed)]
     for _ in range(n_steps):
-        told.append(env.step(actions.random(env.action_space.shape).astype(np.float32)))
-        if told[-1][2] or told[-1][3]:
-            told.append(env.reset())
-    return told
+        returned.append(env.step(actions.random(env.action_space.shape).astype(np.float32)))
+        if returned[-1][2] or returned[-1][3]:
+            returned.append(env.reset())
+    return returned
 
 
 @pytest.mark.filterwarnings("error")
@@ -67,28 +67,30 @@ def test_many_steps_are_the_same_to_the_last_bit(n_steps: int) -> None:
 
 def test_a_worm_at_rest_feels_nothing_and_lies_on_its_belly(env: WormEnv) -> None:
     quiet = worm_env(start_activation=0.0)
-    told = quiet.layout.named(quiet.reset(seed=0)[0])
-    assert np.allclose(told.pop("heading"), [1.0, 0.0, 0.0])
-    assert np.allclose(told.pop("upright"), [1.0, 0.0])
-    assert all(np.allclose(value, 0.0) for value in told.values())
+    observed = quiet.layout.named(quiet.reset(seed=0)[0])
+    assert np.allclose(observed.pop("heading"), [1.0, 0.0, 0.0])
+    assert np.allclose(observed.pop("upright"), [1.0, 0.0])
+    assert all(np.allclose(value, 0.0) for value in observed.values())
 
 
-def test_what_it_tells_is_what_the_worm_does(env: WormEnv) -> None:
+def test_an_observation_is_what_the_worm_does(env: WormEnv) -> None:
     env.reset(seed=0)
     before = rest = env.sensation
-    told = {}
+    observed = {}
     for k in range(6):
         observation, *_, info = env.step(wave(k, 3))
-        told, felt = env.layout.named(observation), env.sensation
-        assert np.allclose(told["activation"], wave(k, 3))
-        assert np.allclose(told["stretch_strain"], felt.stretch_m / felt.rest_stretch_m - 1.0, atol=1e-6)
-        assert np.allclose(told["touch"], np.minimum(felt.touch_N / (env.worm.total_mass_kg * 9.80665), 2.0), atol=1e-6)
-        assert np.allclose(told["ring_strain"], felt.ring_length_m / rest.ring_length_m - 1.0, atol=1e-6)
+        observed, felt = env.layout.named(observation), env.sensation
+        assert np.allclose(observed["activation"], wave(k, 3))
+        assert np.allclose(observed["stretch_strain"], felt.stretch_m / felt.rest_stretch_m - 1.0, atol=1e-6)
+        assert np.allclose(
+            observed["touch"], np.minimum(felt.touch_N / (env.worm.total_mass_kg * 9.80665), 2.0), atol=1e-6
+        )
+        assert np.allclose(observed["ring_strain"], felt.ring_length_m / rest.ring_length_m - 1.0, atol=1e-6)
         changed = (felt.ring_length_m - before.ring_length_m) / rest.ring_length_m
-        assert np.allclose(told["ring_rate"] * env.task.interval_s, changed, atol=1e-6)
+        assert np.allclose(observed["ring_rate"] * env.task.interval_s, changed, atol=1e-6)
         assert info["time_s"] == pytest.approx(felt.time_s)
         before = felt
-    assert told["ring_strain"].min() < -0.05
+    assert observed["ring_strain"].min() < -0.05
 
 
 def test_progress_adds_up_to_the_way(env: WormEnv) -> None:

@@ -13,7 +13,7 @@ from PIL import Image
 from annelid import RunConfig, load_config, simulate
 from annelid.body import build_spec
 from annelid.body.assemble import mjcf_text
-from annelid.draw.scene import DrawnWorm
+from annelid.draw.drawn_worm import DrawnWorm
 from annelid.errors import ConfigError
 from annelid.simulation import Run
 from annelid.simulation.worm import WormPlant

@@ -165,7 +165,6 @@ def long_columns() -> Network:
 
 NETWORKS = {
     "3 segments": peristalsis_network(3),
-    "4 segments": peristalsis_network(4),
     "own": own_network(),
     "columns": long_columns(),
     "robust": robust_network(3),

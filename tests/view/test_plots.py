@@ -27,11 +27,6 @@ def test_figure7_is_a_picture_with_curves_on_white(planar_run: Run, picture: Pat
         assert np.any(np.all(pixels == wanted, axis=2)), f"nothing drawn in {color}"
 
 
-def test_figure7_of_a_3d_worm_shows_six_sensors(rods_run: Run, picture: Path) -> None:
-    assert rods_run.data.sizes["sensor"] == 6
-    assert figure7(rods_run, picture).stat().st_size > 10_000
-
-
 def test_lines_differ_in_dashes_in_grey_and_for_colour_blind_readers(subtests: pytest.Subtests) -> None:
     for n_lines in (2, 3, 4):
         with subtests.test(f"{n_lines!r:.60}"):

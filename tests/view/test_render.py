@@ -12,9 +12,10 @@ import pytest
 
 from annelid.body.worm import WormBody
 from annelid.config import load_config
+from annelid.draw.drawn_worm import DrawnWorm
 from annelid.draw.overlay import Overlay, bar_length, length_name
 from annelid.draw.render import render_frame, render_strip, render_video
-from annelid.draw.scene import DrawnWorm, WormScene
+from annelid.draw.scene import WormScene
 from annelid.errors import MissingDependency, RunFileError
 from annelid.simulation.loop import simulate
 from annelid.simulation.runfile import Run
@@ -121,7 +122,7 @@ def test_impossible_videos_are_refused(subtests: pytest.Subtests, planar_run: Ru
             assert list(folder.iterdir()) == []
 
 
-@pytest.mark.parametrize(("fps", "suffix"), [(1.0, "mp4"), (23.976, "mov"), (240.0, "mkv")])
+@pytest.mark.parametrize(("fps", "suffix"), [(1.0, "mp4"), (240.0, "mkv")])
 def test_possible_rates_are_written_whole(planar_run: Run, tmp_path: Path, fps: float, suffix: str) -> None:
     target = render_video(planar_run, tmp_path / f"a.{suffix}", fps=fps, speed=fps / 10, size=(160, 96))
     assert imageio.v3.imread(target).shape[0] == 31
@@ -146,10 +147,9 @@ def an_ffmpeg(folder: Path, while_writing: str) -> Path:
     [
         # Stops after two pictures, as on a full disk, but takes the others.
         '"{real}" "${{@:1:$#-1}}" -frames:v 2 "${{@: -1}}"; cat >/dev/null; exit 1',
-        "cat >/dev/null; exit 1",
         "echo No space left on device >&2; exit 1",
     ],
-    ids=["truncated", "nothing", "broken pipe"],
+    ids=["truncated", "broken pipe"],
 )
 def test_a_video_that_ffmpeg_does_not_finish_is_refused_and_removed(
     planar_run: Run,
@@ -252,14 +252,10 @@ def test_soft_crossings_have_a_bar_to_each_strand(subtests: pytest.Subtests) -> 
 
 
 @needs_gl
-@pytest.mark.parametrize("suffix", ["png", "pdf", "svg"])
-def test_a_strip_has_its_frames_with_their_times(rods_run: Run, tmp_path: Path, suffix: str) -> None:
-    target = render_strip(rods_run, tmp_path / f"strip.{suffix}", 4)
-    assert target.stat().st_size > 20_000
-    if suffix == "png":
-        width, height = imageio.v3.imread(target).shape[1::-1]
-        assert width == pytest.approx(7.2 * 300, abs=2)
-        assert height > 0.4 * width, "two rows"
+def test_a_strip_has_its_frames_in_rows(rods_run: Run, tmp_path: Path) -> None:
+    width, height = imageio.v3.imread(render_strip(rods_run, tmp_path / "strip.png", 4)).shape[1::-1]
+    assert width == pytest.approx(7.2 * 300, abs=2)
+    assert height > 0.4 * width, "two rows"
 
 
 def test_impossible_strips_are_refused(planar_run: Run, tmp_path: Path) -> None:

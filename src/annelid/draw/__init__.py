@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from annelid.body.formulations.rods.net import STRAND_RGBA
     from annelid.draw.camera import VIEWS_DEG, fitting_distance, picture_axes, picture_points
     from annelid.draw.canvas import plain, save
+    from annelid.draw.drawn_worm import CONTRACTED_WIDTH, SPRING_RGBA
     from annelid.draw.figures import RUN_FIGURES
     from annelid.draw.figures.comparison import lengths_figure, potentials_figure, travel_figure
     from annelid.draw.figures.experiments import load_frame_figure, progress_figure, uncertainty_figure
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
     from annelid.draw.page import html_page
     from annelid.draw.plots import figure7, plot_path
     from annelid.draw.render import DEFAULT_CAMERA, render_frame, render_video
-    from annelid.draw.scene import CONTRACTED_WIDTH, SPRING_RGBA, Skeleton, WormScene, postures_of, render_still
+    from annelid.draw.scene import Skeleton, WormScene, postures_of, render_still
     from annelid.draw.table import UNKNOWN, comparison_table, fields_table, framed_table
 
 __all__ = [

@@ -35,7 +35,8 @@ def number(line: str, pattern: str) -> float:
 
 
 def answer(*command: str, path: Path | None = None) -> str:
-    environment = os.environ | ({"PYTHONPATH": str(path)} if path is not None else {})
+    paths = [str(path), *filter(None, [os.environ.get("PYTHONPATH")])] if path is not None else None
+    environment = os.environ | ({"PYTHONPATH": os.pathsep.join(paths)} if paths is not None else {})
     done = subprocess.run(
         [sys.executable, *command], capture_output=True, text=True, timeout=200, env=environment, check=False
     )
@@ -94,6 +95,34 @@ def test_a_package_adds_a_command_and_a_format_by_their_entry_points(installed: 
     lengths = installed / "lengths.txt"
     answer("-m", "annelid", "export", str(finished), "--to", "txt", "-o", str(lengths), path=installed)
     assert all(float(line) > 0 for line in lengths.read_text().splitlines())
+
+
+def test_a_body_of_a_package_runs_and_is_checked_drawn_viewed_and_exported(
+    installed: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(installed)
+    answer(
+        "-c",
+        "from pathlib import Path\n"
+        "from annelid import check, load_config, simulate\n"
+        "from annelid.draw import render_frame\n"
+        "from annelid.export import FORMATS\n"
+        "from annelid.live.page import export_page\n"
+        "config = load_config('mass-chain', {'duration_s': 1.0})\n"
+        "(found,) = check(load_config('mass-chain', {'clock.physics_timestep_s': 0.005}))\n"
+        "assert not check(config) and found.severity == 'error'\n"
+        "run = simulate(config, 'run')\n"
+        "assert run.data['center_of_mass'].values[-1, 0] < run.data['center_of_mass'].values[0, 0] - 0.02\n"
+        "render_frame(run, 0.5, 'frame.png')\n"
+        "export_page(run, 'recorded.html')\n"
+        "export_page(load_config('mass-chain', {'duration_s': 0.2}), 'living.html')\n"
+        "for name, path in (('csv', 'tables'), ('html', 'out.html')):\n"
+        "    FORMATS.find(name).write(run, Path(path), lambda done, total: None)\n",
+        path=installed,
+    )  # fmt: skip
+    assert all((installed / name).stat().st_size > 5000 for name in ("frame.png", "recorded.html", "living.html"))
+    assert (installed / "out.html").stat().st_size > 5000
+    assert len(list((installed / "tables").iterdir())) > 1
 
 
 @pytest.mark.slow

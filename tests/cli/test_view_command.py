@@ -23,8 +23,9 @@ def refusal(*words: str) -> str:
     return " ".join(result.output.split())
 
 
-def test_planar_worms_and_unknown_presets_are_refused() -> None:
-    assert "this needs the 3D worm" in refusal("riddle2022-planar")
+def test_robots_of_a_file_and_unknown_presets_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "robot.toml").write_text('[body]\nkind = "mjcf"\n')
+    assert "cannot be viewed" in refusal(str(tmp_path / "robot.toml"))
     assert "did you mean 'riddle2023'" in refusal("ridle2023")
 
 

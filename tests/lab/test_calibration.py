@@ -137,10 +137,6 @@ def test_white_noise_leaves_every_point_and_a_slow_error_few() -> None:
     found = estimated(data, data.values, np.ones((150, 1)), np.zeros((1, 1)), None)
     assert found.noise == pytest.approx(1.0, abs=0.25)
     assert found.effective_points(data) > 60
-
-
-def test_a_stated_noise_is_kept() -> None:
-    data = slow_points(np.random.default_rng(3), Noise(1.0, 2.0, 1.0))
     assert estimated(data, data.values, np.ones((150, 1)), np.zeros((1, 1)), 0.7).noise == 0.7
 
 
@@ -160,13 +156,6 @@ def test_several_experiments_are_fitted_at_once(tmp_path: Path) -> None:
     assert ends == pytest.approx(linear, rel=0.03)
     assert not found.intervals.confused
     assert found.fit.n_tests == 0
-
-
-def test_points_that_are_held_out_lie_in_their_intervals(tmp_path: Path) -> None:
-    found = both(tmp_path, hold_out=[[0.5, 0.75]])
-    n, inside = found.intervals.held_out["tube"]
-    assert n == 10
-    assert inside >= 8
 
 
 def test_what_the_data_cannot_tell_apart_is_said(tmp_path: Path) -> None:
@@ -276,6 +265,9 @@ def test_a_walk_identifies_the_gates_of_a_planar_worm(tmp_path: Path) -> None:
 
 def test_a_study_is_written_as_numbers_a_worm_and_a_picture(tmp_path: Path) -> None:
     found = both(tmp_path, hold_out=[[0.5, 0.75]])
+    n, inside = found.intervals.held_out["tube"]
+    assert n == 10
+    assert inside >= 8, "they lie in the intervals predicted for them"
     report, worm, picture = write_identified(found, tmp_path)
     assert picture.stat().st_size > 10_000
     body = load_config(worm).body
@@ -303,10 +295,6 @@ def renamed(old: str, new: str) -> Callable[[Table], Table]:
     return lambda table: {new if name == old else name: column for name, column in table.items()}
 
 
-def back_in_time(time_s: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.concatenate([time_s[100:], time_s[:100]])
-
-
 def emptied(force: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.where(np.arange(len(force)) % 3, force, np.nan)
 
@@ -320,16 +308,13 @@ def test_a_defect_is_refused_in_a_sentence(subtests: pytest.Subtests, tmp_path: 
         (renamed("force_N", "load_N"), {}, "no column 'force_N'"),
         (renamed("force_N", "force_mm"), {"tube": {"force": "force_mm"}}, "is in m, not in N"),
         (changed(force_N=lambda force: 1e3 * force), {}, "is a unit wrong"),
-        (changed(time_s=back_in_time), {}, "goes back"),
         (changed(force_N=lambda force: np.full_like(force, 3.0)), {}, "never changes"),
         (lambda table: {name: column[:6] for name, column in table.items()}, {}, "6 rows"),
         (whole, {"tube": {"data": "../tube.csv"}}, "must lie beside the study"),
-        (whole, {"tube": {"data": "/etc/passwd"}}, "must lie beside the study"),
         (whole, {"parameters": {"young_modulus": {"lwo": 1.0}}}, "unknown field 'parameters.young_modulus.lwo'"),
         (whole, {"parameters": {"young_modulus": {"low": 5e9, "high": 1e8}}}, "low = 5e\\+09 must be below high"),
         (whole, {"parameters": {"young_modulus": {"start": 1.0}}}, "start = 1 must be from low"),
         (whole, {"parameters": {}}, "must name parameters"),
-        (whole, {"experiments": []}, "must name parameters"),
         (whole, {"parameters": {"mass": {"start": 1.0, "low": 0.1, "high": 2.0, "fields": {"body.masss": 1.0}}}}, "un"),
         (whole, {"parameters": {"damping_time": {}, "cable_friction": {}}}, "no experiment has one of its fields"),
         (whole, {"preset": "riddle2203-rods"}, "did you mean 'riddle2023-rods'"),

@@ -17,7 +17,7 @@ from annelid.errors import ConfigError, RunFileError
 from annelid.live.history import History, Moment, history_of
 from annelid.live.live_worm import LiveWorm, knobs_of
 from annelid.live.panel import MOST_SAMPLES, plots_of
-from annelid.live.picture import REACH_M, Painter, hit_point
+from annelid.live.picture import REACH_M, Painter, hit_point, painter_of
 from annelid.live.player import Player, player_of
 from annelid.live.scene_geoms import triangles
 from annelid.simulation.runfile import Run
@@ -272,7 +272,7 @@ def test_the_ground_is_there(arena: str, overrides: dict[str, Any], nodes: set[s
     player, anatomy = player_of(config)
     server = Server()
     try:
-        stage = Stage(server, config, Painter(anatomy, config), player.moment)
+        stage = Stage(server, config, painter_of(anatomy, config, player.moment), player.moment)
         names = {"floor", "rail_left", "rail_right", "post_0", "relief", "pipe"}
         assert {name for name in names if server.scene.get_handle_by_name(f"/worm/ground/{name}")} == nodes
         for layer in LAYERS:
@@ -289,7 +289,7 @@ def test_a_ray_is_turned_into_the_axes_of_a_slope() -> None:
     player, anatomy = player_of(config)
     server = Server()
     try:
-        stage = Stage(server, config, Painter(anatomy, config), player.moment)
+        stage = Stage(server, config, painter_of(anatomy, config, player.moment), player.moment)
         player.tick(0.5)
         stage.show(player.moment, follow=True)
         place, along = np.array([0.3, -0.1, 0.2]), np.array([0.0, 0.6, 0.8])
@@ -301,6 +301,19 @@ def test_a_ray_is_turned_into_the_axes_of_a_slope() -> None:
         assert (stage.turn @ np.array([-1.0, 0.0, 0.0]))[2] == pytest.approx(0.5)
     finally:
         server.stop()
+
+
+def test_a_planar_worm_is_seen_from_its_side(planar_run: Run) -> None:
+    player, anatomy = player_of(planar_run)
+    first = player.history.at(0.0)
+    picture = painter_of(anatomy, planar_run.config, first).paint(first)
+    assert picture.strands.shape == picture.ring_colors.shape == (3 * 4, 2, 3)
+    ends = planar_run.data["stretch_length"].values[0, :, 0].sum() / 2
+    np.testing.assert_allclose(picture.strands[..., 0].min(), -ends, atol=1e-6)
+    assert not picture.strands[..., 1].any()
+    living, _ = player_of(planar_run.config)
+    living.tick(0.05)
+    assert living.history.span_s[1] >= 0.05
 
 
 def test_names_of_neurons_stay_words_in_the_live_diagram() -> None:

@@ -8,6 +8,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field, field_validator
 
 from annelid.config.answers import Elements
+from annelid.config.kinds import Knob, two_digits
 from annelid.config.run import BodyKind
 from annelid.config.sections import Length, Modulus, NonNegative, PerSegmentOf, Positive, Section
 from annelid.morphology import MeshGeometry, helical_mesh
@@ -181,6 +182,21 @@ class MeshBody(BodyKind):
     def geometry(self) -> MeshGeometry:
         """Returns the mesh at rest."""
         return self.mesh.geometry()
+
+    def knobs(self) -> tuple[Knob, ...]:
+        """Returns the stiffness of strands and springs, as `Kind.knobs`; a slider has one number, for all segments."""
+        rebuilt, knobs = "The body is rebuilt and goes on where it is.", []
+        if isinstance(modulus_Pa := self.strands.young_modulus_Pa, float):
+            field, gpa = "body.strands.young_modulus_Pa", 1e-9 * modulus_Pa
+            low, high, step = map(two_digits, (gpa / 4, 4 * gpa, gpa / 40))
+            hint = f"Young's modulus of the strands, which resists bending. {rebuilt}"
+            knobs.append(Knob(field, "strands (GPa)", 1e-9, low, high, step, hint))
+        if isinstance(rate := self.springs.stiffness_N_per_m, float):
+            field, high = "body.springs.stiffness_N_per_m", two_digits(4 * rate) or 100.0
+            knobs.append(
+                Knob(field, "springs (N/m)", 1.0, 0.0, high, 0.1, f"Stiffness of the axial springs. {rebuilt}")
+            )
+        return tuple(knobs)
 
     @property
     def first_heading_deg(self) -> float:

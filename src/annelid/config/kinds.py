@@ -55,6 +55,16 @@ class Knob:
         return float(f"{shown / self.scale:.10g}")
 
 
+def above(value: float, usual: float) -> float:
+    """Returns the usual upper end of a slider, or one well above a value beyond it."""
+    return usual if value <= usual else two_digits(2.0 * value)
+
+
+def two_digits(value: float) -> float:
+    """Returns two digits of a number, so that sliders end at round ones."""
+    return float(f"{value:.2g}")
+
+
 class Kind(Section):
     """Base of all families: sections of which a configuration chooses one by its field ``kind``.
 

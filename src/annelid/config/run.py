@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 from pydantic import AfterValidator, Field, model_validator
 
 from annelid.config.answers import Elements, Finding, Goals, OwnModel, Walls
-from annelid.config.kinds import Choice, Kind, default_of, kinds_of
+from annelid.config.kinds import Choice, Kind, Knob, above, default_of, kinds_of
 from annelid.config.sections import Friction, Impedance, Line, NonNegative, Positive, Section, Seed, Share
 from annelid.config.settings import Clock, Contraction, Guard, Record, StretchSensor, is_multiple
 from annelid.errors import ConfigError, listed
@@ -268,6 +268,12 @@ class ArenaKind(Checked, Kind):
     contact_impedance: Impedance = Field(
         default=(0.9, 0.95, 0.001), description="solimp (d0, dwidth, width) of the contacts"
     )
+
+    def knobs(self) -> tuple[Knob, ...]:
+        """Returns its friction, as `Kind.knobs`."""
+        sliding = f"Sliding friction of skin and ground ({'forwards' if self.has_setae else 'any direction'}). "
+        hint = sliding + "Takes effect in the next step."
+        return (Knob("arena.friction", "friction", 1.0, 0.01, above(self.friction, 2.0), 0.01, hint),)
 
     @property
     def has_setae(self) -> bool:

@@ -24,7 +24,7 @@ class Moment:
     """A worm at one instant."""
 
     time_s: float
-    qpos: NDArray[np.floating]  # generalised positions, (nq,)
+    qpos: NDArray[np.floating]  # generalised positions, (nq,), or the outlines of a planar body, m
     activation: NDArray[np.floating]  # of every ring muscle, in [0, 1], (n_muscles,)
     contact_force_N: NDArray[np.floating]  # of the ground on every segment, (n_segments, 3)
 
@@ -77,9 +77,14 @@ def signal_names(neurons: Iterable[str], n_muscles: int) -> tuple[str, ...]:
     return (*neurons, *(f"activation_{muscle + 1}" for muscle in range(n_muscles)))
 
 
-def history_of(run: Run, n_coordinates: int) -> History:
-    """Returns the moments and signals that a run of a 3D worm, a body of so many coordinates, has recorded."""
-    data, qpos = run.data, postures_of(run, n_coordinates)
+def history_of(run: Run, n_coordinates: int | None) -> History:
+    """Returns the moments and signals that a run has recorded, of a 3D worm of so many coordinates or a planar body."""
+    data = run.data
+    if n_coordinates is None:
+        recorded = {str(name): signal.values for name, signal in data.items()}
+        postures, moments = run.config.body.outlines(recorded), data["time"].values
+    else:
+        postures, moments = postures_of(run, n_coordinates), data["frame_time"].values
     neurons = [str(name) for name in data["neuron"].values] if "potential" in data else []
     activation = data["activation"].values
     history = History(signal_names(neurons, activation.shape[1]))
@@ -87,9 +92,9 @@ def history_of(run: Run, n_coordinates: int) -> History:
     signals = np.concatenate([data["potential"].values, activation], axis=1) if neurons else activation
     for time, values in zip(times, signals, strict=True):
         history.add_sample(float(time), values)
-    frame_times = data["frame_time"].values
-    sample = np.clip(np.searchsorted(times, frame_times + 1e-9, side="right") - 1, 0, None)
-    force = data["contact_force"].values
-    for frame, time in enumerate(frame_times):
-        history.add(Moment(float(time), qpos[frame], activation[sample[frame]], force[sample[frame]]))
+    sample = np.clip(np.searchsorted(times, moments + 1e-9, side="right") - 1, 0, None)
+    nothing = np.zeros((len(times), data.sizes["segment"], 3))
+    force = data["contact_force"].values if "contact_force" in data else nothing
+    for number, time in enumerate(moments):
+        history.add(Moment(float(time), postures[number], activation[sample[number]], force[sample[number]]))
     return history

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from annelid.body.worm import worm_of
-from annelid.config import Knob, RunConfig, load_config
+from annelid.config import BodyKind, Knob, RunConfig, load_config
+from annelid.config.kinds import above
 from annelid.live.history import History, Moment, signal_names
 from annelid.morphology import Array
-from annelid.protocols import Records
+from annelid.protocols import Plant, Records
 from annelid.simulation.adjust import adjusted
-from annelid.simulation.stepping import Simulation, build_controller, start
+from annelid.simulation.stepping import Simulation, build_controller, build_plant, start
 from annelid.simulation.worm import WormPlant
 
 ENDLESS_S = 1e7  # a live worm runs until the view ends; its configuration keeps the duration that it has
@@ -22,11 +22,10 @@ SAMPLE_S = 0.01  # signals for the plots are kept at most this often, in simulat
 POKE_S = 0.15  # how long a poke lasts, in simulated time
 POKE_RADIUS_M = 0.06
 """Distance from the middle of a poke at which its force has fallen to 0.6, as under the flat of a hand."""
-_LEAST_FRICTION = 0.01
 
 
 class LiveWorm:
-    """Body and nervous system of a 3D worm from time zero on, and a history of what is remembered of them."""
+    """Body and nervous system from time zero on, and a history of what is remembered of them."""
 
     def __init__(self, config: RunConfig) -> None:
         self._first = self.config = config
@@ -34,7 +33,7 @@ class LiveWorm:
 
     @property
     def plant(self) -> WormPlant:
-        """The body."""
+        """The body of a 3D worm."""
         plant = self.simulation.plant
         assert isinstance(plant, WormPlant)
         return plant
@@ -46,7 +45,7 @@ class LiveWorm:
 
     def restart(self) -> None:
         """Begins anew at time zero under the present configuration, and forgets what was."""
-        plant = WormPlant(self.config)
+        plant = build_plant(self.config)
         controller = build_controller(self.config, plant)
         self.simulation: Simulation = start(_endless(self.config), plant, controller, None)
         self._poke_ends_s = -1.0
@@ -97,8 +96,8 @@ class LiveWorm:
         self._poke_ends_s = self.time_s + POKE_S
 
     def _record(self) -> None:
-        plant, now = self.plant, self.simulation
-        kept = (plant.qpos, now.activation, now.sensation.contact_force_N)
+        now = self.simulation
+        kept = (_posture(self.config.body, now.plant), now.activation, now.sensation.contact_force_N)
         self.history.add(Moment(self.time_s, *(array.astype(np.float32) for array in kept)))
 
     def _record_signals(self) -> None:
@@ -108,44 +107,27 @@ class LiveWorm:
         self._next_sample_s = self.time_s + SAMPLE_S
 
 
+def _posture(body: BodyKind, plant: Plant) -> Array:
+    """Where a body is now, as a `Moment` has it."""
+    if isinstance(plant, WormPlant):
+        return plant.qpos
+    assert isinstance(plant, Records)
+    return body.outlines({**plant.read(False), **plant.read(True)})
+
+
 def knobs_of(config: RunConfig) -> tuple[Knob, ...]:
-    """Returns what can be turned of a 3D worm; sensors and drive only where its controller uses them."""
-    body, arena, controller, sensor = worm_of(config), config.arena, config.controller, config.sensor
-    assert arena is not None
-    friction, strands, springs = "arena.friction", "body.strands.young_modulus_Pa", "body.springs.stiffness_N_per_m"
-    sliding = f"Sliding friction of skin and ground ({'forwards' if arena.has_setae else 'any direction'}). "
-    rebuilt = "The body is rebuilt and goes on where it is."
-    bending = f"Young's modulus of the strands, which resists bending. {rebuilt}"
-    axial = f"Stiffness of the axial springs. {rebuilt}"
-    most = _above(arena.friction, 2.0)
-    knobs = [
-        Knob(friction, "friction", 1.0, _LEAST_FRICTION, most, 0.01, sliding + "Takes effect in the next step."),
-    ]
-    # A slider has one number, for all segments.
-    if isinstance(modulus_Pa := body.strands.young_modulus_Pa, float):
-        gpa = 1e-9 * modulus_Pa
-        knobs.append(Knob(strands, "strands (GPa)", 1e-9, _round(gpa / 4), _round(4 * gpa), _round(gpa / 40), bending))
-    if isinstance(rate := body.springs.stiffness_N_per_m, float):
-        knobs.append(Knob(springs, "springs (N/m)", 1.0, 0.0, _round(4 * rate) or 100.0, 0.1, axial))
+    """Returns what can be turned while a worm runs; sensors only where its controller uses them."""
+    body, arena, controller, sensor = config.body, config.arena, config.controller, config.sensor
+    knobs = [*(() if arena is None else arena.knobs()), *body.knobs()]
     if "tolerance_m" in controller.sensor_fields:
-        most = _above(1e3 * sensor.tolerance_m, 40.0)
+        most = above(1e3 * sensor.tolerance_m, 40.0)
         near = "A stretch sensor is on while its segment is within this of its rest length."
         knobs.append(Knob("sensor.tolerance_m", "sensor tolerance (mm)", 1e3, 0.0, most, 0.5, near))
     if "noise_m" in controller.sensor_fields:
-        most = _above(1e3 * sensor.noise_m, 10.0)
+        most = above(1e3 * sensor.noise_m, 10.0)
         noise = "Standard deviation of the noise on every reading of a stretch sensor."
         knobs.append(Knob("sensor.noise_m", "sensor noise (mm)", 1e3, 0.0, most, 0.1, noise))
     return (*knobs, *controller.knobs())
-
-
-def _above(value: float, usual: float) -> float:
-    """The usual upper end of a range, or one well above a value beyond it."""
-    return usual if value <= usual else _round(2.0 * value)
-
-
-def _round(value: float) -> float:
-    """Two digits of a number, so that sliders end at round ones."""
-    return float(f"{value:.2g}")
 
 
 def _endless(config: RunConfig) -> RunConfig:

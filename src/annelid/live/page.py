@@ -10,7 +10,7 @@ from annelid.config import RunConfig
 from annelid.draw.render import Progress
 from annelid.errors import RunFileError
 from annelid.live.panel import legend_html
-from annelid.live.picture import Painter
+from annelid.live.picture import painter_of
 from annelid.live.player import player_of
 from annelid.live.server import Server, content_policy, with_extras
 from annelid.live.stage import Stage
@@ -39,7 +39,7 @@ def export_page(
         The path written.
 
     Raises:
-        ConfigError: The body is planar, or cannot be built.
+        ConfigError: The body cannot be viewed, or not be built.
         RunFileError: The run holds no postures, or the file has another suffix or cannot be written.
         SimulationStopped: A guard stopped the worm.
     """
@@ -51,8 +51,8 @@ def export_page(
     history, worm = player.history, player.worm
     first_s, last_s = history.span_s if worm is None else (0.0, config.duration_s)
     n_frames = math.floor((last_s - first_s) * FRAMES_A_SECOND + 1e-6) + 1
-    painter = Painter(anatomy, config, GRAIN_M)
     shown = history.at(first_s)
+    painter = painter_of(anatomy, config, shown, GRAIN_M)
     # A server that nobody visits records what it would send.
     server = Server()
     try:
@@ -72,7 +72,7 @@ def export_page(
         page = recording.as_html()
     finally:
         server.stop()
-    page = _with_caption(page, config, legend_html(painter.arrow_N, anatomy.geometry.radius_m), speed)
+    page = _with_caption(page, config, legend_html(painter.arrow_N, painter.radius_m, is_planar=anatomy is None), speed)
     with whole_file(path) as draft:
         draft.write_text(page, encoding="utf-8")
     return path

@@ -107,11 +107,11 @@ class Panel:
         server: viser.ViserServer,
         view: View,
         speed: float,
-        weight_N: float,
+        weight_N: float | None,
         legend: str,
         plots: Mapping[str, Plot] | None = None,
     ) -> None:
-        """Makes all elements; the worm's weight on Earth is what pokes are measured by."""
+        """Makes all elements; pokes are measured by the worm's weight on Earth, None where nothing can be poked."""
         gui = self._gui = server.gui
         self._player = player = view.player
         gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
@@ -162,7 +162,7 @@ class Panel:
         pace = gui.add_slider("speed", SLOWEST, FASTEST, 0.05, speed, hint=hint)
         pace.on_update(_asking(view, setattr, player, "speed"))
 
-    def _physics(self, view: View, config: RunConfig, weight_N: float) -> None:
+    def _physics(self, view: View, config: RunConfig, weight_N: float | None) -> None:
         gui = self._gui
         with gui.add_folder("Physics"):
             for knob in knobs_of(config):
@@ -170,8 +170,9 @@ class Panel:
                     knob.label, knob.low, knob.high, knob.step, knob.shown(config), hint=knob.hint
                 )
                 self._knobs[knob].on_update(_asking(view, view.set_knob, knob))
-            hint = "Force of a poke, the worm's weight at first: click on the worm to push it away from you for 0.15 s."
-            self._poke = gui.add_slider("poke (N)", 0.0, STRONGEST_POKE * weight_N, 0.1, weight_N, hint=hint)
+            if weight_N is not None:
+                hint = "Force of a poke, the worm's weight at first: click on the worm to push it away for 0.15 s."
+                self._poke = gui.add_slider("poke (N)", 0.0, STRONGEST_POKE * weight_N, 0.1, weight_N, hint=hint)
             again = gui.add_button("Reset sliders", hint="Gives every slider above its first value.")
             again.on_click(lambda _: view.request(self._reset, view))
 
@@ -231,8 +232,8 @@ def _asking(view: View, call: Callable[..., Any], *first: Any) -> Callable[[Any]
     return on_update
 
 
-def legend_html(arrow_N: float, radius_m: float) -> str:
-    """Returns the legend; the arrow of this contact force is as long as the worm's radius at rest."""
+def legend_html(arrow_N: float, radius_m: float, *, is_planar: bool = False) -> str:
+    """Returns the legend; the arrow of this contact force is as long as the radius at rest, or half a planar body."""
     percent = f"{100 * SPRING_RANGE:.0f}&thinsp;%"
     rows = (
         (_bar(STRAND_COLORS, smooth=False), "strands: dark and light blue wind in opposite directions"),
@@ -243,6 +244,8 @@ def legend_html(arrow_N: float, radius_m: float) -> str:
             f"force of the ground on a segment: {100 * radius_m:.0f}&thinsp;cm are {arrow_N:g}&thinsp;N",
         ),
     )
+    if is_planar:
+        rows = ((_bar((RELAXED, CONTRACTED)), "sides of a segment, activation 0 to 1"), rows[-1])
     cells = "".join(
         f'<tr><td style="padding:2px 8px 2px 0;text-align:center">{mark}</td><td>{words}</td></tr>'
         for mark, words in rows

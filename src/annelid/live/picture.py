@@ -26,6 +26,7 @@ CONTACT_COLOR = (0.04, 0.45, 0.14)
 SCREEN_GAMMA = 2.2
 REACH_M = 0.04
 """Distance from the line of sight within which a point of the mesh is hit; its meshes are wider than a mouse."""
+EARTH_M_PER_S2 = 9.81
 LONGEST_ARROW = 4.0  # of the arrows of contact forces, in radii of the worm at rest
 
 
@@ -48,6 +49,8 @@ class Painter:
     Attributes:
         model: The compiled worm.
         arrow_N: Contact force whose arrow is as long as the worm's radius at rest, about two segments' weight, N.
+        radius_m: That radius.
+        weight_N: Of the worm on Earth.
     """
 
     def __init__(self, anatomy: Anatomy, config: RunConfig, grain_m: float = 0.0) -> None:
@@ -58,6 +61,7 @@ class Painter:
         self._ring_pairs = np.stack([path[:, :-1], path[:, 1:]], axis=-1).reshape(-1, 2)
         self._corners = path.shape[1] - 1
         assert config.arena is not None
+        self.radius_m, self.weight_N = self._geometry.radius_m, round(EARTH_M_PER_S2 * anatomy.total_mass_kg, 1)
         share = anatomy.total_mass_kg * config.arena.gravity_m_per_s2 / anatomy.n_segments
         self.arrow_N = float(f"{2.0 * share:.1g}") if share > 0 else 1.0
 
@@ -102,6 +106,56 @@ class Painter:
     def _lines(self, points_m: Array) -> Lines:
         lines = points_m.astype(np.float32)
         return (np.round(lines / self._grain_m) * self._grain_m).astype(np.float32) if self._grain_m else lines
+
+
+class PlanarPainter:
+    """Turns the moments of a planar body into pictures: the sides of its segments, which its activation colours.
+
+    Attributes:
+        model: None: there is nothing of the engine to show.
+        arrow_N: Contact force whose arrow is as long as `radius_m`, N.
+        radius_m: Half the height of the body at first.
+        weight_N: None: it cannot be poked.
+    """
+
+    model = weight_N = None
+    arrow_N = 1.0
+
+    def __init__(self, first: Moment, grain_m: float = 0.0) -> None:
+        """Takes the first moment, and what places are rounded to."""
+        self._shape, self._grain_m = first.qpos.shape, grain_m
+        self.radius_m = float(np.ptp(first.qpos[..., 1])) / 2
+
+    def strand_colors(self) -> Colors:
+        """Colours of all sides."""
+        n_segments, n_corners, _ = self._shape
+        return _bytes(np.broadcast_to(STRAND_COLORS[0], (n_segments * n_corners, 2, 3)))
+
+    def paint(self, moment: Moment) -> Picture:
+        """Draws one moment."""
+        corners = np.insert(moment.qpos.astype(float), 1, 0.0, axis=-1)
+        sides = np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2, 3)
+        lines = (np.round(sides / self._grain_m) * self._grain_m if self._grain_m else sides).astype(np.float32)
+        foot = corners[np.arange(len(corners)), corners[..., 2].argmin(axis=1)]
+        arrows = np.stack([foot, foot + self.radius_m * moment.contact_force_N / self.arrow_N], axis=1)
+        # A body without springs still has a line for each, of no length.
+        middles = corners.mean(axis=1)
+        return Picture(
+            strands=lines,
+            rings=lines,
+            ring_colors=ring_colors(moment.activation, self._shape[1]),
+            springs=np.stack([middles, middles], axis=1).astype(np.float32),
+            spring_colors=spring_colors(np.zeros(len(middles))),
+            contacts=arrows.astype(np.float32),
+            middle=middles.mean(axis=0),
+        )
+
+
+def painter_of(
+    anatomy: Anatomy | None, config: RunConfig, first: Moment, grain_m: float = 0.0
+) -> Painter | PlanarPainter:
+    """Returns what draws a 3D worm, or a planar body, which has no anatomy."""
+    return PlanarPainter(first, grain_m) if anatomy is None else Painter(anatomy, config, grain_m)
 
 
 def ring_colors(activation: NDArray[np.floating], n_corners: int) -> Colors:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from annelid.config import RunConfig
-from annelid.errors import SimulationStopped
+from annelid.errors import ConfigError, SimulationStopped
 from annelid.live.history import History, Moment, history_of
 from annelid.live.live_worm import LiveWorm
 from annelid.simulation.anatomy import Anatomy
@@ -105,15 +105,18 @@ class Player:
         self.playing = True
 
 
-def player_of(source: RunConfig | Run, speed: float = 1.0) -> tuple[Player, Anatomy]:
-    """Returns the player of a configuration, which is run, or of a run, and the body that is seen.
+def player_of(source: RunConfig | Run, speed: float = 1.0) -> tuple[Player, Anatomy | None]:
+    """Returns the player of a configuration, which is run, or of a run, and the compiled body of a 3D worm.
 
     Raises:
-        ConfigError: The body is planar, or cannot be built.
+        ConfigError: The body is a robot that a file describes, or cannot be built.
         RunFileError: The run holds no postures.
     """
+    body = source.config.body if isinstance(source, Run) else source.body
+    if body.own_model is not None:
+        raise ConfigError(f"body.kind = {body.kind!r} cannot be viewed: use annelid run and annelid draw")
     if isinstance(source, Run):
-        anatomy = compile_worm(source.config)
-        return Player(history_of(source, anatomy.model.nq), speed), anatomy
+        anatomy = None if body.is_planar else compile_worm(source.config)
+        return Player(history_of(source, None if anatomy is None else anatomy.model.nq), speed), anatomy
     worm = LiveWorm(source)
-    return Player(worm, speed), worm.plant.anatomy
+    return Player(worm, speed), None if body.is_planar else worm.plant.anatomy

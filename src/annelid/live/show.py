@@ -13,7 +13,7 @@ import numpy as np
 from annelid.config import RunConfig
 from annelid.live.history import Moment
 from annelid.live.panel import Panel, Plot, legend_html, status_html
-from annelid.live.picture import Painter, hit_point
+from annelid.live.picture import hit_point, painter_of
 from annelid.live.player import player_of
 from annelid.live.server import LOOPBACK, Server
 from annelid.live.stage import Stage
@@ -28,7 +28,6 @@ FRAMES_A_SECOND = 30.0  # at most; fewer where a step of the body takes longer
 LONGEST_TICK_S = 0.25  # a computer that was asleep does not make the view leap
 PANEL_INTERVAL_S = 0.33  # between two updates of plots, time and status
 PACE_OVER_S = 2.0  # over which the speed that is reached is measured
-EARTH_M_PER_S2 = 9.81
 
 
 class Show(View):
@@ -59,12 +58,12 @@ class Show(View):
             plots: Further plots beside the worm, by their names.
 
         Raises:
-            ConfigError: The body is planar, or cannot be built.
+            ConfigError: The body cannot be viewed, or not be built.
             RunFileError: The run holds no postures.
         """
         config = source.config if isinstance(source, Run) else source
         player, anatomy = player_of(source, speed)
-        painter = Painter(anatomy, config)
+        painter = painter_of(anatomy, config, player.moment)
         self._ending = threading.Event()
         self._pace: deque[tuple[float, float]] = deque()
         self._drawn: tuple[Moment, bool] | None = None
@@ -72,10 +71,9 @@ class Show(View):
         self._server = Server(host, port)
         self.address = self._server.address
         super().__init__(config, player, Stage(self._server, config, painter, player.moment))
-        weight_N = round(EARTH_M_PER_S2 * anatomy.total_mass_kg, 1)
-        legend = legend_html(painter.arrow_N, anatomy.geometry.radius_m)
-        self.panel = Panel(self._server, self, speed, weight_N, legend, plots)
-        if self.player.worm is not None:
+        legend = legend_html(painter.arrow_N, painter.radius_m, is_planar=anatomy is None)
+        self.panel = Panel(self._server, self, speed, painter.weight_N, legend, plots)
+        if self.player.worm is not None and painter.weight_N is not None:
             self._server.scene.on_click()(lambda event: self.request(self.poke, event.ray_origin, event.ray_direction))
 
     def __enter__(self) -> Self:

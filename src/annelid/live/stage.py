@@ -23,7 +23,7 @@ from annelid.draw.camera import FIELD_OF_VIEW_DEG, fitting_distance, picture_axe
 from annelid.draw.drawn_worm import upright
 from annelid.draw.scene import ROOM
 from annelid.live.history import Moment
-from annelid.live.picture import CONTACT_COLOR, Painter
+from annelid.live.picture import CONTACT_COLOR, Painter, PlanarPainter
 from annelid.live.scene_geoms import SceneGeoms
 from annelid.morphology import Array, heading_turn
 
@@ -61,7 +61,9 @@ class Stage:
         shift_m: Where the model's origin is in the page, m, ``(3,)``.
     """
 
-    def __init__(self, server: viser.ViserServer, config: RunConfig, painter: Painter, moment: Moment) -> None:
+    def __init__(
+        self, server: viser.ViserServer, config: RunConfig, painter: Painter | PlanarPainter, moment: Moment
+    ) -> None:
         """Makes all nodes and places the camera so that the whole worm is seen."""
         from viser.transforms import SO3
 
@@ -92,12 +94,15 @@ class Stage:
             head_length=0.022,
         )
         heading = config.body.first_heading_deg
-        assert config.arena is not None
-        _add_ground(scene, config.arena, float(np.ptp(first.strands[..., 0])), heading)
-        self._geoms = SceneGeoms(scene, f"{_ROOT}/ground", painter.model, Shape(*_squares(0.0)), _FLOOR_LOOK)
-        self._geoms.place(*painter.places(self._geoms.geoms))
+        scene.add_frame(f"{_ROOT}/ground", show_axes=False)
+        if config.arena is not None:
+            _add_ground(scene, config.arena, float(np.ptp(first.strands[..., 0])), heading)
+        self._geoms: SceneGeoms | None = None
+        if isinstance(painter, Painter):
+            self._geoms = SceneGeoms(scene, f"{_ROOT}/ground", painter.model, Shape(*_squares(0.0)), _FLOOR_LOOK)
+        self._place_geoms()
         self._first_middle = first.middle
-        self._level = config.arena.is_plane and config.arena.slope_rad == 0.0
+        self._level = config.arena is not None and config.arena.is_plane and config.arena.slope_rad == 0.0
         points = first.strands.reshape(-1, 3) @ self.turn.T
         target = (points.min(axis=0) + points.max(axis=0)) / 2
         angles = view_angles("isometric", heading)
@@ -117,7 +122,7 @@ class Stage:
         self._springs.points = picture.springs
         self._springs.colors = picture.spring_colors
         self._contacts.points = picture.contacts
-        self._geoms.place(*self._painter.places(self._geoms.geoms))
+        self._place_geoms()
         shift = self.turn @ (self._first_middle - picture.middle) if follow else np.zeros(3)
         if self._level:
             # A worm that breathes is not to make the ground bob.
@@ -125,6 +130,10 @@ class Stage:
         if np.abs(shift - self.shift_m).max() > 1e-4:
             self.shift_m = shift
             self._root.position = shift
+
+    def _place_geoms(self) -> None:
+        if self._geoms is not None and isinstance(self._painter, Painter):
+            self._geoms.place(*self._painter.places(self._geoms.geoms))
 
     def set_visible(self, layer: str, visible: bool) -> None:
         """Shows or hides one of `LAYERS`."""
@@ -139,7 +148,6 @@ class Stage:
 
 def _add_ground(scene: viser.SceneApi, arena: ArenaKind, length_m: float, heading_deg: float) -> None:
     """Adds the arena as it is seen: floor, relief, pipe, rails and posts."""
-    scene.add_frame(f"{_ROOT}/ground", show_axes=False)
     shape, pipe = arena.shape(length_m), arena.is_closed
     if shape is not None and pipe:
         look: dict[str, Any] = {"color": PIPE_RGBA[:3], "opacity": PIPE_RGBA[3], "side": "double"}

@@ -35,7 +35,6 @@ QUICK = {
     ("annelid", "draw"): (),
     ("annelid", "show"): (),
     ("annelid", "list", "runs"): (),
-    ("annelid", "list", "numbers"): (),
     ("annelid", "check"): (),
     ("annelid", "new"): ("--force",),
     ("annelid", "export-network"): ("--force",),

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from annelid_studies.commands.experiment import STUDIES
 from outcome import Command
 
 
@@ -55,12 +56,15 @@ def test_an_unknown_figure_is_refused_with_the_nearest(annelid: Command, finishe
     assert "unknown figure 'trak': did you mean 'track'?" in done.sentence()
 
 
-STUDIES = ("weak-middle", "turning", "speed", "gaits", "slip", "slip-detector", "pipes", "riddle2025", "load-frame")
-
-
 def test_a_file_in_place_of_the_folder_of_runs_is_refused(annelid: Command, subtests: pytest.Subtests) -> None:
     Path("taken").write_text("mine", encoding="utf-8")
-    for words in [*(("study", study) for study in STUDIES), ("calibrate",), ("tune",), ("study", "bench")]:
+    for words in [
+        *(("study", one.name) for one in STUDIES),
+        ("calibrate",),
+        ("tune",),
+        ("study", "bench"),
+        ("study", "load-frame"),
+    ]:
         with subtests.test(" ".join(words)):
             done = annelid(*words, "-o", "taken", "--quiet")
             assert done.exit_code != 0

@@ -35,28 +35,21 @@ def test_the_same_is_made_once(maker: Maker) -> None:
     assert maker.times == 1
 
 
-def test_another_run_makes_it_anew(maker: Maker) -> None:
+def test_another_run_other_code_and_missing_or_damaged_files_make_it_anew(
+    maker: Maker, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    note = maker.stem.with_suffix(".json")
     kept(maker.stem, ["run"], maker)
-    assert kept(maker.stem, ["another run"], maker) == {"caption": "made 2 times"}
-
-
-@pytest.mark.parametrize("suffix", [".svg", ".png", ".json"])
-def test_a_missing_file_makes_it_anew(maker: Maker, suffix: str) -> None:
-    kept(maker.stem, ["run"], maker)
-    maker.stem.with_suffix(suffix).unlink()
-    kept(maker.stem, ["run"], maker)
-    assert maker.times == 2
-
-
-def test_a_damaged_note_makes_it_anew(maker: Maker) -> None:
-    kept(maker.stem, ["run"], maker)
-    maker.stem.with_suffix(".json").write_text('{"mark": ', encoding="utf-8")
-    kept(maker.stem, ["run"], maker)
-    assert maker.times == 2
-
-
-def test_changed_code_makes_it_anew(maker: Maker, monkeypatch: pytest.MonkeyPatch) -> None:
-    kept(maker.stem, ["run"], maker)
-    monkeypatch.setattr("annelid_studies.riddle2023.paper.code_fingerprint", lambda *_: "other code")
-    kept(maker.stem, ["run"], maker)
-    assert maker.times == 2
+    for i, change in enumerate(
+        (
+            maker.stem.with_suffix(".svg").unlink,
+            maker.stem.with_suffix(".png").unlink,
+            note.unlink,
+            lambda: note.write_text('{"mark": ', encoding="utf-8"),
+            lambda: monkeypatch.setattr("annelid_studies.riddle2023.paper.code_fingerprint", lambda *_: "other code"),
+        ),
+        start=2,
+    ):
+        change()
+        assert kept(maker.stem, ["run"], maker) == {"caption": f"made {i} times"}
+    assert kept(maker.stem, ["another run"], maker) == {"caption": "made 7 times"}

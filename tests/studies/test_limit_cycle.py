@@ -23,6 +23,7 @@ from annelid_studies.limit_cycle.cycle import (
     settled,
 )
 from annelid_studies.limit_cycle.flow import Continuous, travel
+from annelid_studies.planar import Riddle2022Plant
 
 
 class Field:
@@ -146,6 +147,7 @@ def test_the_segments_follow_each_other_by_a_third_of_the_cycle():
 def test_copies_step_as_the_worm_does() -> None:
     config = worm(4, {"clock.physics_timestep_s": 0.005, "sensor.hysteresis_m": 1e-4})
     plant = build_plant(config)
+    assert isinstance(plant, Riddle2022Plant)
     controller = build_controller(config, plant)
     loop, state, switches = settled(plant, controller, 0.001, 1.0, stride=5)
     sensation = plant.sense()

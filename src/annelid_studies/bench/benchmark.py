@@ -272,10 +272,10 @@ class Measurements:
         """
         config, *perturbed = (one.model_dump(mode="json") for one in (case.case.config, *case.perturbed))
         with Processes(1) as process:
-            measured = process.submit(measure_alone, config, perturbed).result()
+            measured = json.dumps(process.submit(measure_alone, config, perturbed).result(), indent=1, allow_nan=False)
         self.folder.mkdir(parents=True, exist_ok=True)
-        write_text(self._path(case), json.dumps(measured, indent=1, allow_nan=False))
-        return measured
+        write_text(self._path(case), measured)
+        return json.loads(measured)
 
     def _path(self, case: BenchCase) -> Path:
         code = case_key(case.case) + code_fingerprint("annelid.analysis", MEASURING)

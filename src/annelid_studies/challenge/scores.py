@@ -30,7 +30,7 @@ _EMPTY: dict[str, str] = dict.fromkeys(("slip_J", "work_J", "electric_J", "perio
 
 @dataclass(frozen=True, slots=True)
 class Score:
-    """What one run scored; what an entrant that was refused would have scored is not told."""
+    """What one run scored; an entrant that was refused has no numbers."""
 
     entrant: str
     task: str

@@ -90,8 +90,8 @@ class Entrant(Section):
     @model_validator(mode="after")
     def _tuned_on_training_seeds(self) -> Self:
         by_task = self.tuned_on if isinstance(self.tuned_on, Mapping) else {"all tasks": self.tuned_on}
-        met = {task: [seed for seed in seeds if seed >= FIRST_TEST_SEED] for task, seeds in by_task.items()}
-        if named := "; ".join(f"{task}: {', '.join(map(str, seeds))}" for task, seeds in met.items() if seeds):
+        test_seeds = {task: [seed for seed in seeds if seed >= FIRST_TEST_SEED] for task, seeds in by_task.items()}
+        if named := "; ".join(f"{task}: {', '.join(map(str, seeds))}" for task, seeds in test_seeds.items() if seeds):
             raise ValueError(f"tuned_on has test seeds ({named}): tune on seeds below {FIRST_TEST_SEED}")
         return self
 
@@ -211,8 +211,8 @@ def entries(
         segments = int(shared.get("body.mesh.n_segments", 3))
         for seed in seeds:
             drawn = found.drawn(name, seed)
-            changes, told = {**shared, **drawn, "seed": seed}, " ".join(f"{name}={x:g}" for name, x in drawn.items())
+            changes, listed = {**shared, **drawn, "seed": seed}, " ".join(f"{name}={x:g}" for name, x in drawn.items())
             for entrant, its in entrants.items():
                 case = Case(found.preset, {**changes, "controller": its.fields(segments)})
-                made.append(Entry(entrant, name, seed, told, segments, case))
+                made.append(Entry(entrant, name, seed, listed, segments, case))
     return made

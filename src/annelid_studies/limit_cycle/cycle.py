@@ -67,19 +67,12 @@ class LimitCycle:
         labels: Names of the states.
         period_s: Period, s.
         timestep_s: Step that it was computed with, s.
-        section: Where the cycle begins and ends.
         closing_error: Largest distance between beginning and end in any state, as a share of its range.
         n_returns: Returns to the section (or Newton steps) that it took to close the orbit.
         time_s: Instants, s, from 0 to the period, ``(n_phases + 1,)``.
         state: Shape ``(n_phases + 1, n_states)``.
-        switches: Switches in force there, ``(n_phases + 1, n_switches)``.
         switch_time_s: When a switch moves, s, ``(n_moves,)``.
-        range: Peak to peak of every state over the cycle (1 for one that does not move), ``(n_states,)``.
-        transitions: State-transition matrices from each instant to the next, ``(n_phases, n_states, n_states)``.
-        monodromy: Their product, the state-transition matrix of a period, ``(n_states, n_states)``.
-        multipliers: Floquet multipliers, its eigenvalues, by falling magnitude, ``(n_states,)``, complex.
-        eigenvectors: Its right eigenvectors at the section in the same order, one a column, of norm 1 when every
-            state is measured by its range, ``(n_states, n_states)``, complex.
+        multipliers: Floquet multipliers, by falling magnitude, ``(n_states,)``, complex.
         trivial: Index of the multiplier nearest to 1, whose eigenvector is along the orbit.
         phase_response: Infinitesimal phase response curves, ``(n_phases + 1, n_states)``: by how many seconds a
             cycle is advanced by a unit of perturbation of each state there; on a kink, the mean of both sides.
@@ -88,18 +81,12 @@ class LimitCycle:
     labels: tuple[str, ...]
     period_s: float
     timestep_s: float
-    section: Section
     closing_error: float
     n_returns: int
     time_s: Array
     state: Array
-    switches: Switches = field(repr=False)
     switch_time_s: Array = field(repr=False)
-    range: Array = field(repr=False)
-    transitions: Array = field(repr=False)
-    monodromy: Array = field(repr=False)
     multipliers: NDArray[np.complex128]
-    eigenvectors: NDArray[np.complex128] = field(repr=False)
     trivial: int
     phase_response: Array = field(repr=False)
 
@@ -281,8 +268,7 @@ def find_limit_cycle(
         state, switches = end, last
     arcs = _arcs(orbit, n_phases)
     transitions = _transitions(flow, orbit, arcs)
-    monodromy = _product(transitions)
-    multipliers, eigenvectors, adjoint = _decomposed(monodromy, orbit.range)
+    multipliers, adjoint = _decomposed(_product(transitions), orbit.range)
     state, switches = orbit.state[arcs], orbit.switches[arcs]
     velocity = (flow.step(state, switches)[0] - state) / flow.timestep_s
     carried = accumulate(transitions[::-1], lambda later, transition: transition.T @ later, initial=adjoint)
@@ -291,18 +277,12 @@ def find_limit_cycle(
         labels=flow.labels,
         period_s=float(orbit.time[-1] * flow.timestep_s),
         timestep_s=flow.timestep_s,
-        section=section,
         closing_error=closing,
         n_returns=n_returns,
         time_s=orbit.time[arcs] * flow.timestep_s,
         state=state,
-        switches=switches,
         switch_time_s=orbit.time[orbit.moved] * flow.timestep_s,
-        range=orbit.range,
-        transitions=transitions,
-        monodromy=monodromy,
         multipliers=multipliers,
-        eigenvectors=eigenvectors,
         trivial=int(np.argmin(np.abs(multipliers - 1.0))),
         phase_response=response / (response * velocity).sum(axis=1, keepdims=True),
     )
@@ -332,16 +312,16 @@ def _first_return(flow: Flow, state: Array, before: Switches, section: Section, 
     """
     here = Copies.at(flow, state, before)
     time, states, switches, moved = [0.0], [here.state[0]], [here.switches[0]], []
-    met = False
-    while not met:
+    reached = False
+    while not reached:
         if time[-1] * flow.timestep_s > longest_s:
             raise NoLimitCycle(
                 f"{flow.labels[section.state]} does not rise through {section.threshold:g} within {longest_s:g} s: "
                 "choose another threshold or neuron, or a worm that oscillates"
             )
         there, taken = advance(flow, here, np.ones(1))
-        met = bool(here.state[0, section.state] < section.threshold <= there.state[0, section.state])
-        if met:
+        reached = bool(here.state[0, section.state] < section.threshold <= there.state[0, section.state])
+        if reached:
             there, taken = _stop(flow, section, here, taken)
         elif (there.switches != here.switches).any():
             moved.append(len(time))
@@ -397,12 +377,9 @@ def _product(transitions: Array) -> Array:
     return reduce(lambda product, transition: transition @ product, transitions, np.eye(transitions.shape[1]))
 
 
-def _decomposed(monodromy: Array, scale: Array) -> tuple[NDArray[np.complex128], NDArray[np.complex128], Array]:
-    """Multipliers and right eigenvectors, as `LimitCycle` has them, and the left eigenvector of the trivial one."""
+def _decomposed(monodromy: Array, scale: Array) -> tuple[NDArray[np.complex128], Array]:
+    """Multipliers, by falling magnitude, and the left eigenvector of the trivial one."""
     scaled = monodromy * scale / scale[:, np.newaxis]
-    multipliers, vectors = np.linalg.eig(scaled)
-    order = np.argsort(-np.abs(multipliers), kind="stable")
-    multipliers, vectors = multipliers[order].astype(complex), vectors[:, order].astype(complex)
-    of_left, left = np.linalg.eig(scaled.T)
-    adjoint = np.real(left[:, np.argmin(np.abs(of_left - 1.0))]) / scale
-    return multipliers, (scale[:, np.newaxis] * vectors).astype(complex), adjoint
+    multipliers, left = np.linalg.eig(scaled.T)
+    adjoint = np.real(left[:, np.argmin(np.abs(multipliers - 1.0))]) / scale
+    return multipliers[np.argsort(-np.abs(multipliers), kind="stable")].astype(complex), adjoint

@@ -237,8 +237,8 @@ def _beside_the_paper(main: Outcome) -> Table:
     ):
         difference = (words.number(ours) - paper) / (paper if unit == " %" else 1.0)
         deviation = words.in_unit(difference, PERCENT, 1, sign="+")
-        told = [words.in_unit(value, scale, digits) for value in (paper, ours)]
-        rows.append([quantity, *told, deviation if deviation == words.NOTHING else deviation + unit])
+        printed = [words.in_unit(value, scale, digits) for value in (paper, ours)]
+        rows.append([quantity, *printed, deviation if deviation == words.DASH else deviation + unit])
     return Table(["quantity", "paper", "ours", "deviation"], rows)
 
 

@@ -16,7 +16,7 @@ from annelid.morphology import Array
 from annelid.textfiles import parse_toml
 
 CM, MM, MS, PERCENT = 100.0, 1000.0, 1000.0, 100.0
-NOTHING = "–"
+DASH = "–"
 """Printed where there is no number."""
 
 
@@ -34,7 +34,7 @@ def in_unit(value: float | None, scale: float = 1.0, digits: int = 2, sign: str 
     """Formats a number after scaling it, with a plus where ``sign`` is one; a dash for None and NaN."""
     scaled = number(value) * scale
     if not isfinite(scaled):
-        return NOTHING
+        return DASH
     text = f"{scaled:{sign}.{digits}f}"
     return text.removeprefix("-") if float(text) == 0.0 else text.replace("-", "−")
 
@@ -79,7 +79,7 @@ def span(values: Iterable[float] | Array, scale: float = 1.0, digits: int = 2) -
     """Formats the range of some numbers, ``12 to 40``, or the number if all are printed alike."""
     finite = [value for value in np.ravel([*values]) if isfinite(value)]
     if not finite:
-        return NOTHING
+        return DASH
     low, high = in_unit(min(finite), scale, digits), in_unit(max(finite), scale, digits)
     return low if low == high else f"{low} to {high}"
 
@@ -87,9 +87,9 @@ def span(values: Iterable[float] | Array, scale: float = 1.0, digits: int = 2) -
 def rhythm(score: RhythmScore | None) -> str:
     """Says what a rhythm is, for a table: ``1-2-3, 2.63 s``, ``disordered``, ``silent after 0.74 s``."""
     if score is None:
-        return NOTHING
+        return DASH
     if score.verdict == "ordered":
-        period = NOTHING if score.period_s is None else f"{score.period_s:.2f} s"
+        period = DASH if score.period_s is None else f"{score.period_s:.2f} s"
         if score.direction == 0:
             return f"{score.wave_fronts} fronts, {period}"
         segments = range(1, max(score.order) + 1)[:: score.direction]

@@ -264,7 +264,7 @@ def _search(
     following: Callable[[Readings], Sequence[float]],
 ) -> dict[Key, Readings]:
     """Pulls an end of every worm, from first values on, until nothing follows from what was read, or `ROUNDS` times."""
-    tried: dict[Key, dict[float, Pulled]] = {key: {} for key in worms}
+    found: dict[Key, dict[float, Pulled]] = {key: {} for key in worms}
     wanted = dict(first)
     for _ in range(ROUNDS):
         cases = {
@@ -272,11 +272,11 @@ def _search(
         }
         store.compute(cases.values(), "setting the actuators")
         for (key, value), case in cases.items():
-            tried[key][value] = read_pull(1, store[case])
-        wanted = {key: values for key, readings in tried.items() if (values := following(readings))}
+            found[key][value] = read_pull(1, store[case])
+        wanted = {key: values for key, readings in found.items() if (values := following(readings))}
         if not wanted:
             break
-    return dict(tried)
+    return dict(found)
 
 
 def _next_lengths(readings: Readings) -> Sequence[float]:

@@ -152,7 +152,7 @@ def asymmetry_table(found: Asymmetry) -> TerminalTable:
         weak: lambda one: _number(one.weak, 3) or "-",
         strong: lambda one: _number(one.strong, 3) or "-",
         "difference": lambda one: f"{100 * one.difference:.0f} %" if isfinite(one.difference) else "-",
-        "tried, cm": lambda one: " to ".join(f"{100 * end:.2f}" for end in one.tried),
+        "tried, cm": lambda one: " to ".join(f"{100 * end:.2f}" for end in one.extremes_m),
     }
     caption = ""
     if found.confirmed is not None:

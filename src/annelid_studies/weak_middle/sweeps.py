@@ -251,7 +251,7 @@ class Answer:
     label: str  # The cause in words, with its unit
     weak: float  # Its value where an interior segment elongates as the robot's weaker one; NaN if none was found
     strong: float  # The same for the stronger one
-    tried: tuple[float, float]  # Smallest and largest elongation of the interior segment over the values tried, m
+    extremes_m: tuple[float, float]  # Smallest and largest elongation of the interior segment over the values tried, m
 
     @property
     def difference(self) -> float:

@@ -92,7 +92,7 @@ def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
         "update order": lambda beat: beat.scheme,
         "rhythm": lambda beat: words.rhythm(beat.rhythm),
         "period (s)": lambda beat: words.in_unit(beat.rhythm.period_s, digits=4),
-        "first onsets (s)": lambda beat: " ".join(map(words.in_unit, beat.onsets_s[:6])) or words.NOTHING,
+        "first onsets (s)": lambda beat: " ".join(map(words.in_unit, beat.onsets_s[:6])) or words.DASH,
         "first contraction (s)": lambda beat: (
             words.in_unit(beat.first_s) if np.isfinite(beat.first_s) else "to the end"
         ),

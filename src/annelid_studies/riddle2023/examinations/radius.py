@@ -54,7 +54,7 @@ def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
         "worm": lambda one: one.worm.label,
         "radius (mm)": lambda one: f"{one.value:g}",
         "bending stiffness (1)": lambda one: f"{_stiffness(one.value):.2f}",
-        "open loop (cm)": lambda one: words.all_in_cm(one.held_m) if one.hold else words.NOTHING,
+        "open loop (cm)": lambda one: words.all_in_cm(one.held_m) if one.hold else words.DASH,
         "closed loop (cm)": lambda one: words.all_in_cm(one.walked_m),
         "deficit, first helix (%)": lambda one: words.in_percent(one.closed.summary.middle_deficit),
         "median force (N)": lambda one: words.in_unit(one.force_N),

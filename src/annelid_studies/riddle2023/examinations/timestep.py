@@ -127,8 +127,8 @@ def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
     columns: Columns = {
         "worm": lambda one: one.worm.label,
         "step, ms": lambda one: f"{one.value:g}",
-        "rhythm": lambda one: "flies apart" if _fate(one) == "flies apart" else words.rhythm(one.rhythm),
-        "onsets": lambda one: "-".join(map(str, one.closed.rhythm.order)) or words.NOTHING,
+        "rhythm": lambda one: "flies apart" if _verdict(one) == "flies apart" else words.rhythm(one.rhythm),
+        "onsets": lambda one: "-".join(map(str, one.closed.rhythm.order)) or words.DASH,
         "first helix peak to peak (cm)": lambda one: words.all_in_cm(one.walked_helix_m),
         "mean of six springs (cm)": lambda one: words.all_in_cm(one.walked_m),
         "travel forwards (cm)": lambda one: words.in_cm(one.travel_m, 1),
@@ -153,7 +153,7 @@ def _steps(steps_ms: Iterable[float]) -> str:
     return words.listed(f"{step:g}" for step in steps_ms)
 
 
-def _fate(one: Reading) -> str:
+def _verdict(one: Reading) -> str:
     if one.closed.summary.status == "stopped_by_guard":
         return "flies apart"
     kind = words.kind(one.closed.rhythm)
@@ -167,7 +167,7 @@ def _speed(one: Reading) -> float | None:
 
 def _walks_in_words(own: Sequence[Reading]) -> str:
     good = [one for one in own if one.walks]
-    bad = words.listed(f"{one.value:g} ms ({_fate(one)})" for one in own if not one.walks)
+    bad = words.listed(f"{one.value:g} ms ({_verdict(one)})" for one in own if not one.walks)
     mean, helix = (
         words.in_percent(np.ptp(values) / float(np.mean(values)) if len(values) > 1 else None)
         for values in ([one.walked_m[0] for one in good], [one.walked_helix_m[0] for one in good])

@@ -24,7 +24,7 @@ LEAST_OVERLAP = 0.5
 LONGEST_GAP_SAMPLES = 3.0
 """Gaps of up to so many of the log's usual steps are interpolated; longer ones are left out."""
 EQUAL, NEARLY = 1e-5, 0.001
-"""Of lags with a correlation so close to the best one's the smallest is taken; another that is nearly as good is named."""
+"""Of lags whose correlation is so close to the best one's: the smallest is taken, or another one is named."""
 LEAST_PERIODIC = 0.3
 """Smallest autocorrelation one period later of a signal that counts as periodic."""
 MOST_SAMPLES = 2_000_000

@@ -22,8 +22,8 @@ from annelid.errors import SimulationStopped
 from annelid.morphology import Array
 from annelid.plausibility import check, refuse_nonsense
 from annelid.protocols import SIDES, Recordable, Sensation, Signal, State, Values
-from annelid.simulation.anatomy import Anatomy, Posture, add_contact_sensors, laid_down
-from annelid.simulation.energies import EnergyTotals, Powers, done_in
+from annelid.simulation.anatomy import Anatomy, Posture, add_contact_sensors, start_placement
+from annelid.simulation.energies import EnergyTotals, Powers, work_in_step
 from annelid.simulation.ground import MovingGround
 from annelid.simulation.objects import NO_ENCOUNTER
 from annelid.simulation.skin import Touch
@@ -159,7 +159,7 @@ class WormPlant:
         self._activation: Array = np.zeros(anatomy.n_muscles)
         data = self.data = mujoco.MjData(self.model)
         self.qpos, self.act, self.ctrl, self.warned = data.qpos, data.act, data.ctrl, data.warning.number
-        self.start = laid_down(anatomy, body)
+        self.start = start_placement(anatomy, body)
         self.mechanics = body.formulation.mechanics(self.model, data, self.geometry, body, arena, self._step_s)
         self.ground = MovingGround(self.model, self.geometry, arena) if arena.has_moving_planes else None
         self.reset(0)
@@ -224,7 +224,7 @@ class WormPlant:
         powers = self.anatomy.energy_meter.read(self.data, drive, self.mechanics.losses_W())
         before, self.posture = self.posture, self._locate()
         shortening = before.ring_length - self.posture.ring_length
-        self.energies = self.energies.plus(done_in(self._step_s, shortening, self._powers, powers))
+        self.energies = self.energies.plus(work_in_step(self._step_s, shortening, self._powers, powers))
         self._powers = powers
 
     def _prepare(self) -> None:

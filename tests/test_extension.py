@@ -20,11 +20,12 @@ HOLDS: dict[str, Callable[[list[str]], bool]] = {
     "own_arena": lambda lines: number(lines[1], "at ([0-9.]+) mm") < number(lines[0], "at ([0-9.]+) mm") - 3.0,
     "own_formulation": lambda lines: number(lines[1], "at ([0-9.]+) mm") < number(lines[0], "at ([0-9.]+) mm") - 3.0,
     "own_actuator": lambda lines: lines == ["greatest force 1.50 N of 1.5 N"],
+    "own_circuit": lambda lines: all(Path(line).stat().st_size > 500 for line in lines[-3:]),
     "own_study": lambda lines: number(lines[1], "0.1: ([0-9.]+) cm") > number(lines[0], "1: ([0-9.]+) cm"),
     "own_outputs": lambda lines: all(Path(line).stat().st_size > 20 for line in lines[-2:]),
 }
 """What an example's output must say, beyond that it runs."""
-FAST = ("own_arena", "own_outputs")
+FAST = ("own_arena", "own_circuit", "own_outputs")
 """Examples that run in a few seconds; only the slow tests run the others."""
 
 

@@ -1,6 +1,7 @@
 """The kinds and presets that this package adds to annelid."""
 
 from annelid.config import add_presets
+from annelid_studies import faults as faults
 from annelid_studies import oscillators as oscillators
 from annelid_studies import planar as planar
 

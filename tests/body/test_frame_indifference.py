@@ -20,7 +20,7 @@ from annelid.analysis.gait import cycle_marks
 from annelid.analysis.track import forward_position
 from annelid.config import load_config
 from annelid.protocols import Array
-from annelid.simulation.anatomy import Placed, turned
+from annelid.simulation.anatomy import Placement, turned_placement
 from annelid.simulation.worm import WormPlant
 from rods import rods_of
 
@@ -47,19 +47,19 @@ class Lost(NamedTuple):
     rates: Array
 
 
-def deformed(plant: WormPlant) -> Placed:
+def deformed(plant: WormPlant) -> Placement:
     """Contracts the first segment, and half of the second."""
     plant.reset(0)
     plant.move(np.array([1.0, 0.4, 0.0]), 60)
-    return Placed(plant.qpos.copy(), np.eye(3))
+    return Placement(plant.qpos.copy(), np.eye(3))
 
 
-def at_rest(plant: WormPlant) -> Placed:
+def at_rest(plant: WormPlant) -> Placement:
     plant.reset(0)
-    return Placed(plant.qpos.copy(), np.eye(3))
+    return Placement(plant.qpos.copy(), np.eye(3))
 
 
-def lost(plant: WormPlant, placed: Placed, velocity: Array) -> Lost:
+def lost(plant: WormPlant, placed: Placement, velocity: Array) -> Lost:
     """The rates of the rods' strains in a posture that moves, and what the material takes."""
     model, data, strains = plant.model, mujoco.MjData(plant.model), rods_of(plant).strains
     # Their rows at a posture know it and nothing else.
@@ -89,7 +89,7 @@ def twists_of(model: mujoco.MjModel) -> NDArray[np.int64]:
     return np.flatnonzero(model.jnt_type[model.dof_jntid] == int(mujoco.mjtJoint.mjJNT_HINGE))
 
 
-def rotation(plant: WormPlant, placed: Placed, spin: Array) -> Array:
+def rotation(plant: WormPlant, placed: Placement, spin: Array) -> Array:
     """Velocities of a posture that turns as a rigid body: the slides' and the rods' twists, ``(nv,)``."""
     model, data = plant.model, mujoco.MjData(plant.model)
     data.qpos[:] = placed.qpos
@@ -139,7 +139,7 @@ def test_a_motion_is_damped_alike_whichever_way_the_worm_lies(plant: WormPlant) 
     for turn in ORIENTATIONS.as_matrix():
         own = velocity.copy()
         own[slides] = velocity[slides] @ turn.T
-        powers.append(lost(plant, turned(model, turn, posture=placed.qpos), own).power_W)
+        powers.append(lost(plant, turned_placement(model, turn, posture=placed.qpos), own).power_W)
     assert powers[0] > 1e-3
     assert powers == pytest.approx([powers[0]] * len(powers), rel=1e-9)
 

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from annelid.body import build_spec
-from annelid.body.mesh import Mesh
 from annelid.config import load_config
 from annelid.morphology import helical_mesh
 
@@ -174,25 +173,6 @@ def test_slippery_ground_lets_a_pushed_worm_slide() -> None:
         travelled.append(data.subtree_com[0, 0] - start)
     assert travelled[0] > 0.05
     assert travelled[1] < 0.2 * travelled[0]
-
-
-def test_every_field_of_the_mesh_shapes_it() -> None:
-    fields = {
-        "n_segments": 4,
-        "n_helices": 8,
-        "radius_m": 0.1,
-        "angular_rate_rad_per_m": 20.0,
-        "elements_per_side": 2,
-        "elements_per_end": 4,
-        "planes_between_rings": 3,
-        "free_planes_at_ends": 2,
-        "rear_overhang_m": 0.013,
-    }
-    assert set(fields) == set(Mesh.model_fields)
-    ours = Mesh.model_validate(fields).geometry()
-    expected = helical_mesh(fields.pop("n_segments"), **fields)  # type: ignore[arg-type]
-    assert np.array_equal(ours.vertices_m, expected.vertices_m)
-    assert np.array_equal(ours.rings, expected.rings)
 
 
 def test_twist_hinges_carry_the_polar_inertia_of_their_edge() -> None:

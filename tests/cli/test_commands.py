@@ -93,7 +93,7 @@ def test_plot_and_render_write_where_they_are_told(annelid: Command, finished: P
     assert annelid("draw", finished, "-o", "f.svg").exit_code == 0
     assert Path("f.svg").read_text().lstrip().startswith("<?xml")
     assert annelid("draw", finished, "--figure", "network", "-o", "n.svg").out.split() == ["n.svg"]
-    assert 'id="neuron-contraction_1"' in Path("n.svg").read_text()
+    assert 'id="neuron-1"' in Path("n.svg").read_text()
     done = annelid("draw", finished, "--time", "0.5", "-o", "frame.jpg", "--video", "v.mp4", "--fps", "5")
     assert done.exit_code == 0, done.err
     assert done.out.split() == ["frame.jpg", "v.mp4"]

@@ -17,7 +17,7 @@ from annelid.control.open_loop import Contraction, Program
 from annelid.control.sns import Sns
 from annelid.errors import ConfigError
 from annelid.protocols import Sensation
-from annelid.simulation import Run, simulate
+from annelid.simulation import simulate
 
 ONE = {"segment": 1, "start_s": 0.0, "stop_s": 0.6}
 
@@ -177,30 +177,3 @@ def test_a_planar_worm_does_what_the_program_says(tmp_path: Path) -> None:
     heights = run.data["ring_length"].values
     assert heights[:, 1] == pytest.approx(0.11)
     assert 0.07 < heights[:, 2].min() < 0.105
-
-
-def joined_equal(first: Run, second: Run, whole: Run) -> None:
-    for name, variable in whole.data.variables.items():
-        if {"time", "frame"} & set(variable.dims) and name != "wall_time":
-            parts = [part.data[name].values for part in (first, second)]
-            np.testing.assert_array_equal(np.concatenate(parts), variable.values, err_msg=str(name))
-
-
-def rods(duration_s: float) -> RunConfig:
-    coarse = {"body.mesh.elements_per_side": 1, "body.rings.layout": "halves", "clock.control_timestep_s": 0.005}
-    return load_config(
-        "riddle2023-rods",
-        {**coarse, **programmed({"segment": 2, "start_s": 0.05, "stop_s": 0.3}), "duration_s": duration_s},
-    )
-
-
-def test_a_worm_of_rods_contracts_its_ring_and_can_be_continued(tmp_path: Path) -> None:
-    whole = simulate(rods(0.4), tmp_path / "3", progress=False)
-    rings = whole.data["ring_length"].values.reshape(-1, 3, 2).sum(axis=2)
-    assert rings[-1, 1] < 0.85 * rings[0, 1]
-    before = whole.data["time"].values <= 0.05
-    assert before.sum() > 1
-    assert np.abs(rings[before] / rings[0] - 1).max() < 0.02
-    np.testing.assert_array_equal(whole.data["activation"].values[:, 2], whole.data["activation"].values[:, 3])
-    first = simulate(rods(0.2), tmp_path / "1", progress=False)
-    joined_equal(first, simulate(rods(0.4), tmp_path / "2", resume=first, progress=False), whole)

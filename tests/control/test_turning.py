@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from circuits import controller
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from annelid.config import check_config, load_config
@@ -119,12 +119,9 @@ class TestEveryKind:
         other.set_state(one.get_state())
         for here in way[150:]:
             assert np.array_equal(one.step(here), other.step(here))
-
-    def test_resets_to_what_it_was(self, section: TurningKind) -> None:
-        one = turned(section, sns())
-        fresh = [one.step(here) for here in journey(100)]
         one.reset(0)
-        assert np.array_equal(fresh, [one.step(here) for here in journey(100)])
+        fresh = turned(section, sns())
+        assert all(np.array_equal(one.step(here), fresh.step(here)) for here in way[:100])
 
     def test_a_mirrored_journey_mirrors_the_activation(self, section: TurningKind) -> None:
         mirrored = mirror_of(section)
@@ -165,15 +162,6 @@ def test_a_modulation_takes_from_one_side_only(modulation: float) -> None:
     left, right = half_scales(modulation)
     assert right - left == pytest.approx(modulation)
     assert max(left, right) == 1.0
-
-
-@settings(max_examples=20)
-@given(st.lists(st.floats(0.0, 0.05), min_size=5, max_size=5))
-def test_zero_modulation_is_the_plain_nervous_system_bit_for_bit(lengthenings_m: list[float]) -> None:
-    plain, turning = sns(), turned(ConstantTurning(modulation=0.0), sns())
-    for k, longer_m in enumerate(lengthenings_m):
-        here = felt(k * 0.02, longer_m=longer_m)
-        assert np.array_equal(plain.stride(here, 20), turning.stride(here, 20))
 
 
 def test_the_pattern_keeps_its_rhythm_and_one_side_its_size(subtests: pytest.Subtests) -> None:
@@ -275,8 +263,8 @@ def drive(section: TurningKind, duration_s: float) -> np.ndarray:
 class TestTouch:
     """The published rule, worked out by hand at steps of 10 ms: rate 0.1 a step."""
 
-    def scales(self, *forces_N: float, section: TouchTurning | None = None) -> list[list[float]]:
-        steering = (section or TouchTurning()).build(1, 0.01)
+    def scales(self, *forces_N: float) -> list[list[float]]:
+        steering = TouchTurning().build(1, 0.01)
         return [
             steering.advance(felt(left_N=max(-f, 0.0), right_N=max(f, 0.0)), 1)[0].round(9).tolist() for f in forces_N
         ]
@@ -289,16 +277,10 @@ class TestTouch:
         left = [scale for scale, _ in self.scales(6.0, 6.0, 6.0, 6.0, 6.0, 9.0, 3.0, 3.0, 0.5)]
         assert left == [0.9, 0.8, 0.7, 0.6, 0.6, 0.5, 0.4, 0.4, 0.4]
 
-    def test_contact_on_the_left_scales_the_right_side(self) -> None:
-        assert self.scales(-6.0, -6.0)[-1] == [1.0, 0.8]
-
     def test_a_running_timer_listens_to_one_newton(self) -> None:
         # 2.1 N starts it; -1.5 N then scales the right side to 0.9, -0.9 N nothing.
         assert self.scales(2.1, -1.5, -1.5)[-1] == pytest.approx([1 - 2.1 / 15, 0.9], abs=1e-9)
         assert self.scales(2.1, -0.9, -0.9)[-1][1] == 1.0
-
-    def test_fifteen_newtons_silence_a_side(self) -> None:
-        assert self.scales(*[40.0] * 12)[-1] == [0.0, 1.0]
 
     def test_six_seconds_later_it_goes_straight_again(self) -> None:
         scales = self.scales(9.0, *[0.0] * 620)

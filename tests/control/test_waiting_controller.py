@@ -12,7 +12,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from annelid.control import CircuitController
-from annelid.errors import ConfigError
 from annelid.nervous import Network, Neuron, PeristalsisParameters, Synapse, neuron_names, peristalsis_network
 from annelid.nervous.peristalsis import waiting_network
 from annelid.protocols import Array
@@ -164,8 +163,3 @@ def test_the_network_has_the_parameters_of_its_section() -> None:
     found = waiting(gate_time_constant_ms=600.0).circuit.network
     assert found.to_toml() == waiting_network(4, PeristalsisParameters(gate_time_constant_ms=600.0)).to_toml()
     assert found.to_toml() != waiting_network(4).to_toml()
-
-
-def test_too_few_segments_are_refused() -> None:
-    with pytest.raises(ConfigError, match="at least 3"):
-        waiting_network(2)

@@ -41,6 +41,7 @@ QUICK = {
     ("annelid", "export"): ("--force",),
     ("annelid", "list", "presets"): (),
     ("annelid", "list", "arenas"): (),
+    ("annelid", "list", "numbers"): (),
     ("annelid", "study", "load-frame"): (),
     ("annelid", "cite"): (),
     ("annelid", "compare"): (),

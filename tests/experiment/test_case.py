@@ -8,9 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from annelid.config import RunConfig, load_config, parse_assignments
-from annelid.control.open_loop import Program
 from annelid.experiment.case import Case
-from annelid_studies.worms import CHAIN, PLANAR, RODS, chain, fast, one_after_the_other, rods
+from annelid_studies.worms import CHAIN, PLANAR, RODS, chain, fast, rods
 
 
 def typed(command: str) -> RunConfig:
@@ -47,19 +46,7 @@ def test_a_command_makes_the_run_of_its_case(
         assert_same_run(case)
 
 
-milliseconds = st.integers(1, 2000).map(lambda n: n * 5 / 1000)
 positive = st.floats(1e-3, 10.0)
-
-
-@settings(max_examples=30)
-@given(hold_s=milliseconds, rest_s=milliseconds, n_segments=st.integers(3, 6))
-def test_open_loop_commands_make_the_run_of_their_case(hold_s: float, rest_s: float, n_segments: int) -> None:
-    case = rods({"body.mesh.n_segments": n_segments, **one_after_the_other(n_segments, hold_s, rest_s)})
-    assert_same_run(case)
-    program = case.config.controller
-    assert isinstance(program, Program)
-    assert [contraction.segment for contraction in program.contractions] == list(range(1, n_segments + 1))
-    assert program.contractions[-1].stop_s == pytest.approx(case.config.duration_s, abs=2e-9)
 
 
 @settings(max_examples=30)

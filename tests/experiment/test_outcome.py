@@ -11,7 +11,7 @@ from annelid.experiment.case import Case
 from annelid.experiment.outcome import outcome, read_outcome, write_outcome
 from annelid.simulation.loop import simulate
 from annelid.simulation.runfile import Run
-from annelid_studies.worms import FAST, PLANAR, RODS, one_after_the_other
+from annelid_studies.worms import FAST, RODS, one_after_the_other
 
 HOLD_S, REST_S = 0.3, 0.2
 PROGRAM = one_after_the_other(hold_s=HOLD_S, rest_s=REST_S)
@@ -63,11 +63,6 @@ def test_an_incomplete_outcome_is_refused(held: Run, tmp_path: Path) -> None:
             read_outcome(path)
 
 
-def test_no_outcome_is_an_os_error(tmp_path: Path) -> None:
-    with pytest.raises(OSError, match="No such file"):
-        read_outcome(tmp_path / "outcome.json")
-
-
 def test_holds_are_read_at_the_end_of_each_contraction(held: Run) -> None:
     holds = outcome(held).holds
     assert [hold.segment for hold in holds] == [1, 2, 3]
@@ -93,8 +88,3 @@ def ring_length_at_end(run: Run, segment: int) -> float:
     stop_s = (segment - 1) * (HOLD_S + REST_S) + HOLD_S
     ring = run.data["ring_length"].sel(time=stop_s, method="nearest")
     return float(ring.values.reshape(3, -1)[segment - 1].sum())
-
-
-def test_closed_loop_has_no_holds(tmp_path: Path) -> None:
-    read = outcome(simulate(Case(PLANAR, {"duration_s": 0.1}).config, tmp_path, progress=False))
-    assert read.holds == ()

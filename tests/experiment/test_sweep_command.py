@@ -204,16 +204,3 @@ def written(folder: Path) -> dict[str, int]:
         path.parent.name: path.with_name("run.nc").stat().st_mtime_ns
         for path in folder.glob(f"out/runs/[!.]*/{OUTCOME_NAME}")
     }
-
-
-@pytest.mark.slow
-def test_ctrl_c_says_how_to_go_on(tmp_path: Path) -> None:
-    (tmp_path / "study.toml").write_text(MANY.replace("0.3", "2000.0").replace("200\n", "4\n"))
-    sweep = [sys.executable, "-m", "annelid", "sweep", "study.toml", "-o", "out", "--jobs", "2"]
-    with started(*sweep, folder=tmp_path) as process:
-        wait_for(lambda: len(list(tmp_path.glob("out/runs/*/run.nc"))) == 2, 60)
-        os.killpg(process.pid, signal.SIGINT)
-        assert process.wait(60) == 130
-    log = (tmp_path / "-m.log").read_text()
-    assert "go on with: annelid sweep study.toml -o out --jobs 2" in log
-    assert "Traceback" not in log

@@ -48,17 +48,29 @@ WORMS: dict[str, tuple[str, dict[str, Any]]] = {
         {"controller": {"kind": "sns"}, "turning": {"kind": "course", "waypoints": WAYPOINTS}},
     ),
     "touch": ("riddle2025-3x1", {"controller": {"kind": "sns-robust"}, "turning": {"kind": "touch"}}),
+    "own": ("riddle2023-rods", {"controller": {"kind": "baton"}}),
 }
+OWN = ROOT / "examples" / "extend" / "own_circuit.py"
+"""A kind that only says which circuit it is."""
 
 
-def load_benchmark() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("firmware_benchmark", ROOT / "benchmarks" / "firmware.py")
+def load_module(name: str, path: Path) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module
     spec.loader.exec_module(module)
     return module
+
+
+def load_benchmark() -> ModuleType:
+    return load_module("firmware_benchmark", ROOT / "benchmarks" / "firmware.py")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def own_kind() -> None:
+    load_module("own_circuit", OWN)
 
 
 @pytest.fixture(scope="module")

@@ -214,6 +214,16 @@ def test_another_period_is_noted_and_not_taken_for_drift(run: Run, tmp_path: Pat
     assert any("a difference of +4" in note for note in found.notes)
 
 
+def test_a_lag_that_fits_as_well_is_named(run: Run, tmp_path: Path) -> None:
+    """Once the worm has started, a log of three periods fits one period later, too."""
+    found = agreement_of(run, log_of(run, lag_s=9.0).iloc[:360], tmp_path)
+    (note,) = found.notes
+    assert note.startswith("a lag of ")
+    other_s = float(note.split()[3])
+    assert (found.lag_s - 9.0) / PERIOD_S == pytest.approx(round((found.lag_s - 9.0) / PERIOD_S), abs=0.02)
+    assert abs(other_s - found.lag_s) == pytest.approx(PERIOD_S, abs=0.05)
+
+
 def test_a_wrong_last_time_is_refused_before_memory_is_filled(run: Run, tmp_path: Path) -> None:
     log = log_of(run)
     log.loc[log.index[-1], "t_ms"] = 1e18

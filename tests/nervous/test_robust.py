@@ -177,9 +177,6 @@ def test_bad_parameters_are_refused(subtests: pytest.Subtests) -> None:
     ):
         with subtests.test(f"{change!r:.60}"), pytest.raises(ConfigError, match=words):
             replace(RobustParameters(), **change)
-
-
-def test_two_segments_are_refused() -> None:
     with pytest.raises(ConfigError, match="n_segments must be at least 3, not 2"):
         robust_network(2)
 

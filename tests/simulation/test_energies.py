@@ -11,7 +11,7 @@ import pytest
 from annelid.body.actuators.muscle import Rings
 from annelid.body.actuators.servo import ServoRings
 from annelid.config import load_config
-from annelid.simulation.energies import EnergyMeter, EnergyTotals, Powers, done_in
+from annelid.simulation.energies import EnergyMeter, EnergyTotals, Powers, work_in_step
 from annelid.simulation.worm import WormPlant
 
 FREE = {"arena.floor_gap_m": 30.0, "body.rings.passive_peak": 1e-12}
@@ -161,7 +161,7 @@ def test_the_totals_of_a_mass_on_a_spring_and_a_servo_lack_what_the_step_takes()
             mujoco.mj_step(model, data)
             before, powers = powers, energy_meter.read(data, data.ctrl)
             assert powers.tension[0] == pytest.approx(pulled(data, v), abs=1e-9)
-            totals = totals.plus(done_in(step_s, np.array([x - float(data.qpos[0])]), before, powers))
+            totals = totals.plus(work_in_step(step_s, np.array([x - float(data.qpos[0])]), before, powers))
         held = 0.5 * mass * data.qvel[0] ** 2 + 0.5 * rate * (data.qpos[0] + 0.1) ** 2 - 0.5 * rate * 0.1**2
         left = float(totals.muscle_work[0] - totals.damping_loss - totals.constraint_loss) - held
         assert data.qpos[0] < -0.1

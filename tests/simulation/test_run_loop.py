@@ -61,13 +61,6 @@ def test_recorded_length_is_true_and_felt_length_is_noisy(tmp_path: Path) -> Non
     assert np.abs(between - np.eye(N)).max() < 0.15
 
 
-def test_without_noise_the_felt_length_is_the_true_one(tmp_path: Path) -> None:
-    controller = ToyController()
-    config = toy_config(record__signals_interval_s=0.001)
-    run = simulate(config, tmp_path, plant=SavedToyPlant(), controller=controller)
-    np.testing.assert_array_equal(controller.felt, run.data["stretch_length"].values[:-1])
-
-
 def test_one_seed_gives_one_run_and_another_seed_another(tmp_path: Path) -> None:
     def lengths(seed: int, out: str) -> Array:
         config = toy_config(seed=seed, sensor__noise_m=0.001)

@@ -112,22 +112,6 @@ def test_a_clock_that_changes_while_it_runs_starts_from_rest() -> None:
     assert np.array_equal(going.plant.mechanics.get_state()["qpos_before"], going.plant.qpos)
 
 
-def test_a_worm_goes_on_from_its_state_to_the_bit() -> None:
-    step_s = 0.02
-    first, second = (plant("riddle2023-rods", **COARSE, **{"clock.physics_timestep_s": step_s}) for _ in range(2))
-    pull = np.tile([1.0, 0.0, 0.4], (first.steps_to_move(), 1))
-    for _ in range(4):
-        first.stride(pull)
-    second.set_state(first.get_state())
-    for worm in (first, second):
-        for _ in range(3):
-            worm.stride(pull)
-    assert np.array_equal(first.qpos, second.qpos)
-    assert np.array_equal(first.data.qvel, second.data.qvel)
-    assert first.energies.damping_loss == second.energies.damping_loss
-    assert first.data.time == pytest.approx(7 * step_s)
-
-
 def test_soft_crossings_do_not_shake() -> None:
     """Where the end of a step was predicted from one velocity alone, they lost four times the muscles' work."""
     worm = plant("riddle2023-fast")

@@ -148,7 +148,7 @@ def test_what_was_kept_is_restored() -> None:
     assert all(np.array_equal(states[0][name], states[1][name]) for name in states[0])
 
 
-STOPPED: list[tuple[str, dict[str, Any], str]] = [
+STOPPED: list[tuple[str, dict[str, Any]]] = [
     (
         "riddle2023-rods",
         {

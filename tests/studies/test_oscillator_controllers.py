@@ -42,7 +42,7 @@ def built(kind: str, n_segments: int = 3, n_muscles: int | None = None) -> Contr
         case "shc":
             return HeteroclinicController(HeteroclinicChannel(noise=1e-3), *size, 0.001)
         case _:
-            return PhaseChainController(PhaseChain(drive=2.0, drive_slope_per_s=0.5, limbs=True), *size, 0.001)
+            return PhaseChainController(PhaseChain(drive=2.0), *size, 0.001)
 
 
 def drive(controller: Controller, first: int, steps: int, n: int = 3) -> np.ndarray:
@@ -181,18 +181,6 @@ def test_a_gain_that_can_silence_the_channel_is_refused() -> None:
     HeteroclinicController(HeteroclinicChannel(feedback="none", feedback_gain_per_s=1.01), 3, 3, 0.001)
 
 
-def test_the_drive_s_slope_takes_a_walking_worm_to_swimming() -> None:
-    one = PhaseChainController(PhaseChain(drive=2.0, drive_slope_per_s=0.1, limbs=True), 4, 4, 0.005)
-    phase = np.empty((4000, 6))
-    for k in range(4000):
-        one.step(at(k * 5e-3, 4))
-        phase[k] = one.read(frame=False)["oscillator_phase"]
-    rate_Hz = np.diff(phase[:, 0]) / 5e-3 / (2 * np.pi)
-    # At 8 s the drive is 2.8 (limbs lead), at 15 s 3.5.
-    assert rate_Hz[1590:1610].mean() == pytest.approx(0.56, abs=0.05)
-    assert rate_Hz[2990:3010].mean() == pytest.approx(1.0, abs=0.05)
-
-
 def test_a_bad_section_is_refused_in_one_sentence(subtests: pytest.Subtests) -> None:
     for controller, sentence in (
         ({"kind": "shc", "noise": 0, "bias_per_s": 0, "feedback": "none"}, "would rest at its first node"),
@@ -233,20 +221,6 @@ def test_noise_is_continued_bit_for_bit(tmp_path: Path) -> None:
     whole = simulate(planar("shc", 1.0, **noisy), tmp_path / "3", progress=False)
     first = simulate(planar("shc", 0.4, **noisy), tmp_path / "1", progress=False)
     joined_equal(first, simulate(planar("shc", 1.0, **noisy), tmp_path / "2", resume=first, progress=False), whole)
-
-
-def rods(kind: str, duration_s: float) -> RunConfig:
-    coarse = {"body.mesh.elements_per_side": 1, "clock.control_timestep_s": 0.005, "duration_s": duration_s}
-    return load_config("riddle2023-rods", {"controller": {"kind": kind}, **coarse})
-
-
-@pytest.mark.parametrize("kind", ["sine", "shc"])
-def test_a_worm_of_rods_is_driven_and_continues_bit_for_bit(kind: str, tmp_path: Path) -> None:
-    whole = simulate(rods(kind, 0.4), tmp_path / "3", progress=False)
-    first = simulate(rods(kind, 0.2), tmp_path / "1", progress=False)
-    joined_equal(first, simulate(rods(kind, 0.4), tmp_path / "2", resume=first, progress=False), whole)
-    rings = whole.data["ring_length"].values
-    assert rings[:, 0].min() < 0.9 * rings[0, 0]
 
 
 def test_contact_cue_is_the_size_of_the_force_on_the_segment_before() -> None:

@@ -13,13 +13,31 @@ from annelid.errors import ConfigError
 from annelid_studies.oscillators import (
     HeteroclinicRing,
     HeteroclinicStepper,
-    bias_dwell_s,
     handover_input,
     largest_gain_per_s,
-    noise_dwell_s,
 )
 
 rings = st.builds(HeteroclinicRing, st.integers(3, 8), st.floats(1.0, 50.0), st.floats(1.1, 5.0))
+
+
+def bias_dwell_s(ring: HeteroclinicRing, bias_per_s: np.ndarray) -> np.ndarray:
+    """Time that a small constant input mu takes to leave a node, to an activity delta of one half, s.
+
+    ``T = ln(delta lambda_u lambda_s / (mu (lambda_u + lambda_s))) / lambda_u``.
+    """
+    leave, settle = ring.leaving_rate_per_s, ring.growth_rate_per_s
+    return np.log(0.5 * leave * settle / (leave + settle) / bias_per_s) / leave
+
+
+def noise_dwell_s(ring: HeteroclinicRing, noise: np.ndarray) -> np.ndarray:
+    """Mean time that small noise epsilon alone takes to leave a node, s: Stone and Holmes 1990, eq. 2.28.
+
+    ``<T> = (ln(delta / epsilon) + (gamma + ln(4 lambda_u lambda_s / (lambda_u + lambda_s))) / 2) / lambda_u`` with
+    Euler's gamma, as ``<ln|Z|> = -(gamma + ln 2) / 2`` for a standard normal Z.
+    """
+    leave, settle = ring.leaving_rate_per_s, ring.growth_rate_per_s
+    constant = 0.5 * (np.euler_gamma + np.log(4.0 * leave * settle / (leave + settle)))
+    return (np.log(0.5 / noise) + constant) / leave
 
 
 def jacobian(ring: HeteroclinicRing, node: int) -> np.ndarray:

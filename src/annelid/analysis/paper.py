@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, reduce
 from importlib import resources
 from typing import Any
 
-from annelid.analysis.comparison import differing_fields, relative_difference
+from annelid.analysis.comparison import differing_fields
 from annelid.analysis.summary import NUMBERS, Summary
 from annelid.config import RunConfig, load_config, preset_names
 from annelid.config.run import published_worms
@@ -67,35 +66,6 @@ def published(config: RunConfig) -> dict[str, Published]:
     return {}
 
 
-@dataclass(frozen=True, slots=True)
-class Agreement:
-    """How a run compares with the paper's formulation.
-
-    Attributes:
-        order: Whether the segments contract in the same order.
-        period: Relative difference of the period; None where either has none.
-        elongation: Relative difference of the largest mean elongation, segment by segment; None where it is not known.
-    """
-
-    order: bool
-    period: float | None
-    elongation: tuple[float | None, ...]
-
-    @property
-    def period_agrees(self) -> bool:
-        """Whether the period is within `PERIOD_WITHIN`."""
-        return self.period is not None and abs(self.period) <= PERIOD_WITHIN
-
-    @property
-    def elongation_agrees(self) -> tuple[bool, ...]:
-        """Whether the elongation of each segment is within `ELONGATION_WITHIN`."""
-        return tuple(share is not None and abs(share) <= ELONGATION_WITHIN for share in self.elongation)
-
-    def __bool__(self) -> bool:
-        """Whether order, period and every elongation agree."""
-        return self.order and self.period_agrees and all(self.elongation_agrees)
-
-
 @cache
 def formulation() -> Summary:
     """Returns the numbers of the paper's own formulation, from our run of the preset `FORMULATION`."""
@@ -149,16 +119,6 @@ def _changes(preset: RunConfig, config: RunConfig) -> list[str]:
     changed = [field for field in fields if not field.startswith(uncounted)]
     others = tuple(field.removesuffix("kind") for field in changed if field.endswith(".kind"))
     return [field for field in changed if field.endswith(".kind") or not field.startswith(others)]
-
-
-def agreement(numbers: Summary) -> Agreement:
-    """Compares the numbers of a run of three segments with the paper's own formulation."""
-    theirs = formulation()
-    elongation = relative_difference(theirs.elongation_mean_max_m, numbers.elongation_mean_max_m)
-    period = relative_difference(theirs.period_s, numbers.period_s)
-    assert not isinstance(period, Sequence)
-    of_each = tuple(elongation) if isinstance(elongation, Sequence) else (None,) * theirs.n_segments
-    return Agreement(numbers.order == theirs.order, period, of_each)
 
 
 def _value(config: RunConfig, path: str) -> Any:

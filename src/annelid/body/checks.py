@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from math import cos, degrees, hypot, pi, radians, tan
 from statistics import fmean
 
-from annelid.body.estimates import rhombus_of, softened
+from annelid.body.estimates import rhombus_of, soft_constraint
 from annelid.body.mesh import MeshBody
 from annelid.config.answers import Finding
 from annelid.config.run import RunConfig
@@ -85,7 +85,9 @@ def ground_findings(config: RunConfig, body: MeshBody) -> Iterator[Finding]:
     assert arena is not None
     # Down to half a step contacts are up to twice as soft as asked, which has been measured; below nothing has.
     if arena.contact_time_constant_s < 0.5 * step:
-        yield softened("arena.contact_time_constant_s", arena.contact_time_constant_s, "contacts", step, 0.5 * step)
+        yield soft_constraint(
+            "arena.contact_time_constant_s", arena.contact_time_constant_s, "contacts", step, 0.5 * step
+        )
     if not arena.slope_rad:
         return
     # On ground that rises ahead the skin slides towards the rear.

@@ -22,13 +22,13 @@ from annelid.body.mesh import MeshBody
 from annelid.config.answers import Finding
 from annelid.morphology import Rhombus, rhombus
 
-HARDLY = 0.02
+LEAST_SHORTENED = 0.02
 """Share of its length at rest below which a ring has hardly been shortened."""
 COLLAPSED = 0.2
 """Ring length over that at rest below which a ring counts as collapsed; in all presets it stays above 0.3."""
 _BENDING = 1.3
-UNSURE = 2.0
-SHRUNK = 2 / 3
+ESTIMATE_FACTOR = 2.0
+MOST_SHRUNK_AT_REST = 2 / 3
 """Length over that at rest to which actuators may draw a ring before anything is activated."""
 
 
@@ -62,20 +62,19 @@ def bearable_force_N(body: MeshBody, share: float = 1 / 3) -> float:
     return bending + springs.one_number("stiffness_N_per_m") * stretch * tan(opening)
 
 
-def weak(body: MeshBody, field: str, value: float, force_N: float) -> Iterator[Finding]:
+def weakness_findings(body: MeshBody, field: str, value: float, force_N: float) -> Iterator[Finding]:
     """Checks the greatest force of an actuator against what hardly closes a ring."""
-    needed = bearable_force_N(body, 1.0 - HARDLY)
-    if force_N < needed / UNSURE:
-        problem = (
-            f"a ring is pulled with {force_N:.2g} N at most, where {needed:.2g} N shorten it by {100 * HARDLY:g} %"
-        )
-        instead = f"set at least {UNSURE * value * needed / force_N:.2g}" if force_N else "set more"
+    needed = bearable_force_N(body, 1.0 - LEAST_SHORTENED)
+    if force_N < needed / ESTIMATE_FACTOR:
+        share = 100 * LEAST_SHORTENED
+        problem = f"a ring is pulled with {force_N:.2g} N at most, where {needed:.2g} N shorten it by {share:g} %"
+        instead = f"set at least {ESTIMATE_FACTOR * value * needed / force_N:.2g}" if force_N else "set more"
         yield Finding(f"body.rings.{field}", value, problem, instead)
 
 
-def crushes(field: str, force_N: float, bearable_N: float, share: float) -> Iterator[Finding]:
+def crush_findings(field: str, force_N: float, bearable_N: float, share: float) -> Iterator[Finding]:
     """Checks a force against what the mesh bears, where its actuator closes a ring to a share of its length at rest."""
-    if share < COLLAPSED and force_N > UNSURE * bearable_N:
+    if share < COLLAPSED and force_N > ESTIMATE_FACTOR * bearable_N:
         problem = (
             f"rings close under about {bearable_N:.2g} N, and nothing stops them above {100 * max(0.0, share):.0f} % "
             "of their length at rest"
@@ -84,7 +83,7 @@ def crushes(field: str, force_N: float, bearable_N: float, share: float) -> Iter
         yield Finding(f"body.rings.{field}", force_N, problem, instead)
 
 
-def softened(field: str, value: float, what: str, step: float, engine_s: float | None = None) -> Finding:
+def soft_constraint(field: str, value: float, what: str, step: float, engine_s: float | None = None) -> Finding:
     """Reports a time constant that the engine cannot resolve in steps, or in its own where these are shorter, s."""
     least = 2.0 * (engine_s or step)
     return Finding(

@@ -22,7 +22,7 @@ from annelid.config.checking import (
     whole_path,
 )
 from annelid.config.fidelity import LEVELS, Fidelity, find_level
-from annelid.config.kinds import Choice, Kind, Knob, kinds_of
+from annelid.config.kinds import Choice, Kind, Knob, default_of, kinds_of
 from annelid.config.loading import (
     add_presets,
     arena_names,
@@ -34,7 +34,7 @@ from annelid.config.loading import (
     preset_names,
     preset_text,
 )
-from annelid.config.run import ArenaKind, BodyKind, ControllerKind, RunConfig, TurningKind
+from annelid.config.run import ArenaKind, BodyKind, ControllerKind, RunConfig, TrialKind, TurningKind
 from annelid.config.sections import Length, Line, NonNegative, Positive, Section, Share
 from annelid.config.settings import Clock, Guard, Record, StretchSensor
 from annelid.config.study import Study, Vary, load_study
@@ -66,6 +66,7 @@ __all__ = [
     "Share",
     "StretchSensor",
     "Study",
+    "TrialKind",
     "TurningKind",
     "Vary",
     "add_presets",
@@ -75,6 +76,7 @@ __all__ = [
     "as_config",
     "check_config",
     "check_section",
+    "default_of",
     "field_paths",
     "field_value",
     "fields_of",

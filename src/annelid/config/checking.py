@@ -119,14 +119,17 @@ REPLACED = {
     "guard.stretch": "an axial spring may always be 1.1 times as long as the straight strands beside it",
     "controller.landing": "it saved nothing (sns-pressure)",
     "controller.let_go_s": "it is controller.motor_time_constant_s",
-    "controller.drive_slope_per_s": "the drive of 'adaptive' is constant during a run",
-    "controller.stretch_gain_per_m": "the drive of 'adaptive' is constant during a run",
+    "controller.drive_slope_per_s": "a drive is constant during a run",
+    "controller.stretch_gain_per_m": "a drive is constant during a run",
     "controller.drive_time_constant_s": "the descending neuron of 'adaptive' has 0.05 s",
     "controller.light_N": "'sns-pressure' has the loads of the six-segment robot",
     "controller.full_N": "'sns-pressure' has the loads of the six-segment robot",
     "controller.extending_m": "'sns-pressure' has the lengths of the six-segment robot",
     "controller.extended_m": "'sns-pressure' has the lengths of the six-segment robot",
     "controller.pressure_time_constant_s": "the pressure neurons of 'sns-pressure' have 0.03 s",
+    "controller.limbs": "'phase-chain' has no limbs",
+    "controller.coupling_per_s": "'phase-chain' has the salamander's coupling",
+    "trial.loss_s": "a loss lasts 0.2 s",
     "turning.arm_N": "'touch' is the published rule",
     "turning.hold_s": "'touch' is the published rule",
     "turning.least_N": "'touch' is the published rule",
@@ -159,6 +162,8 @@ CONSTANT = {
     "controller.extending_m": 0.045,
     "controller.extended_m": 0.055,
     "controller.pressure_time_constant_s": 0.03,
+    "controller.coupling_per_s": 10.0,
+    "trial.loss_s": 0.2,
     "turning.arm_N": 2.0,
     "turning.hold_s": 6.0,
     "turning.least_N": 1.0,
@@ -280,7 +285,9 @@ def _explain(detail: ErrorDetails, root: type[Section], tree: Any) -> str:
     if kind == "extra_forbidden":
         unknown = str(detail["loc"][-1])
         path = ".".join([*parts, unknown])
-        if path in REPLACED and root is RunConfig:
+        # A constant of one kind may be a field of another.
+        elsewhere = path in CONSTANT and path in field_paths()
+        if path in REPLACED and root is RunConfig and not elsewhere:
             return f"{path} is no field any more: {REPLACED[path]}; leave it out"
         return f"unknown field {shown(path)}: {_nearest_fields(unknown, parts, section, root)}"
     path = ".".join(parts)

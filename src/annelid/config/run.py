@@ -15,7 +15,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from annelid.config.answers import Elements, Finding, Goals, OwnModel, Walls
 from annelid.config.kinds import Choice, Kind, Knob, above, default_of, kinds_of
-from annelid.config.sections import Friction, Impedance, Line, NonNegative, Positive, Section, Seed, Share
+from annelid.config.sections import Friction, Impedance, Line, NonNegative, Positive, Section, Seed
 from annelid.config.settings import Clock, Contraction, Guard, Record, StretchSensor, is_multiple
 from annelid.errors import ConfigError, listed
 from annelid.registry import Registry
@@ -350,47 +350,25 @@ SHARED = tuple(name for name in ArenaKind.model_fields if name != "kind")
 """Fields of every arena; a worm that is put elsewhere keeps those that the place does not state."""
 
 
-class Trial(Checked, Section):
-    """What goes wrong on purpose, and what a controller may not know; fields that are not set do nothing.
+class TrialKind(Checked, Kind):
+    """Base of the sections of what goes wrong on purpose between a controller and its body; annelid has none itself."""
 
-    Every random draw depends on the run's seed and the time alone, so that a run continues bit for bit.
-    """
+    registry: ClassVar[Registry[type[Any]]] = Registry("trial.kind")
+    default: ClassVar[str] = "faults"
 
-    blind: bool = Field(
-        default=False, description="the controller is built without arena, noise, trial or seed; reset with 0"
-    )
-    drift_m_per_s: NonNegative = Field(default=0.0, description="largest rate at which a reading of stretch drifts")
-    resolution_m: NonNegative = Field(default=0.0, description="stretch is read in multiples of this")
-    loss: Share = Field(default=0.0, description="share of the time in which a sensor keeps its last reading")
-    loss_s: Annotated[float, Field(ge=0.01, le=1e4)] = Field(default=0.2, description="time that one loss lasts")
-    delay_s: Annotated[float, Field(ge=0, le=2)] = Field(default=0.0, description="age of what the controller senses")
-    backlash: Share = Field(default=0.0, description="change of a command that is lost where it reverses")
-    weak_segment: int = Field(default=1, ge=1, le=200, description="segment that weakens")
-    weak_strength: Share = Field(default=1.0, description="share of its activation that it is left")
-    weak_from_s: NonNegative = Field(default=0.0, description="when it weakens")
-    push_N: NonNegative = Field(default=0.0, description="force that pushes the ring of the middle segment to its left")
-    push_from_s: NonNegative = Field(default=0.0, description="when the push begins")
-    push_s: Positive = Field(default=0.5, description="time that it lasts")
-    silent_s: NonNegative = Field(default=0.0, description="until then no command reaches a muscle")
-    random_s: NonNegative = Field(default=0.0, description="until then random commands reach the muscles")
+    def known(self, config: RunConfig, plant: Plant) -> tuple[RunConfig, Plant]:
+        """Returns what a controller may know of its run and its body when it is built: all of it."""
+        return config, plant
 
-    def check_with(self, config: RunConfig) -> None:
-        """Checks that the body has the segment that weakens, and can be pushed."""
-        if self.weak_segment > config.body.n_segments:
-            raise ValueError(
-                f"trial.weak_segment = {self.weak_segment}: must be in 1 .. {config.body.n_segments}, the segments of "
-                "the body"
-            )
-        if self.push_N and not config.body.can_be_pushed:
-            raise ValueError(
-                f"trial.push_N = {self.push_N:g}: body.kind = {config.body.kind!r} cannot be pushed; leave it at 0"
-            )
+    @abstractmethod
+    def between(self, controller: Controller, config: RunConfig, plant: Plant) -> Controller:
+        """Returns a controller with all that goes wrong between it and the body; what can be saved still can.
 
-    def blinded(self, config: RunConfig) -> RunConfig:
-        """Returns what a blind controller may know of a configuration."""
-        arena = None if config.arena is None else default_of(ArenaKind)
-        sensor = config.sensor.model_copy(update={"noise_m": 0.0})
-        return config.model_copy(update={"arena": arena, "sensor": sensor, "trial": None, "seed": 0})
+        Args:
+            controller: The controller.
+            config: The configuration that the section is of.
+            plant: The body.
+        """
 
 
 class RunConfig(Section):
@@ -414,7 +392,9 @@ class RunConfig(Section):
         default=None, description="what scales the two sides of a worm with half-rings"
     )
     sensor: StretchSensor = StretchSensor()
-    trial: Trial | None = Field(default=None, description="what goes wrong on purpose; nothing by default")
+    trial: Annotated[TrialKind, Choice()] | None = Field(
+        default=None, description="what goes wrong on purpose; nothing by default"
+    )
     clock: Clock = Clock()
     record: Record = Record()
     guard: Guard = Guard()

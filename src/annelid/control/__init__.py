@@ -1,6 +1,13 @@
 """Everything that turns sensation into activation."""
 
-from annelid.control.base import CallableController, OpenLoopController, SegmentController, Slope
+from annelid.control.base import (
+    CallableController,
+    OpenLoopController,
+    SavedWrapper,
+    SegmentController,
+    Slope,
+    WrappedController,
+)
 from annelid.control.circuit import SENSED, Circuit, Pulse, Readout, Sense, Source, Switch, lengthening_m
 from annelid.control.circuit_controller import CircuitController, CircuitKind
 from annelid.control.network import NetworkController
@@ -22,6 +29,7 @@ __all__ = [
     "ProgramController",
     "Pulse",
     "Readout",
+    "SavedWrapper",
     "SegmentController",
     "Sense",
     "SineController",
@@ -30,6 +38,7 @@ __all__ = [
     "Switch",
     "TimedController",
     "TurningController",
+    "WrappedController",
     "lengthening_m",
     "own_controller",
     "paper_controller",

@@ -223,14 +223,8 @@ class Steered(Descending):
             wanted = clipped(
                 gain_per_rad * wrapped(target - now.headings[1]) - rate_gain_s * rate,
                 -largest_modulation, largest_modulation);"""
-        constants = {
-            "pi": math.pi,
-            "gain_per_rad": self.gain_per_rad,
-            "rate_gain_s": self.rate_gain_s,
-            "rate_time_constant_s": self.rate_time_constant_s,
-            "rate_share": -math.expm1(-timestep_s / self.rate_time_constant_s),
-            "largest_modulation": self.largest_modulation,
-        }
+        own = self.model_dump(include={"gain_per_rad", "rate_gain_s", "rate_time_constant_s", "largest_modulation"})
+        constants = {"pi": math.pi, "rate_share": -math.expm1(-timestep_s / self.rate_time_constant_s), **own}
         return SteeringCode(
             statements,
             ("heading_rad", *target.senses),

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from annelid.draw.drawn_worm import CONTRACTED_WIDTH, SPRING_RGBA
     from annelid.draw.figures import RUN_FIGURES
     from annelid.draw.figures.comparison import lengths_figure, potentials_figure, travel_figure
-    from annelid.draw.figures.experiments import load_frame_figure, progress_figure, uncertainty_figure
+    from annelid.draw.figures.experiments import progress_figure, uncertainty_figure
     from annelid.draw.figures.network_diagram import network_figure
     from annelid.draw.gl import find_backend
     from annelid.draw.overlay import legend_handle
@@ -64,7 +64,6 @@ __all__ = [
     "legend_handle",
     "lengths_figure",
     "line_looks",
-    "load_frame_figure",
     "network_figure",
     "panel_title",
     "picture_axes",
@@ -88,6 +87,7 @@ __getattr__, __dir__ = lazy(
     __name__,
     {
         "Mark": "progress_figure takes the values of the trials",
+        "load_frame_figure": "annelid_lab.calibration draws loops of a load frame",
         "Panel": "uncertainty_figure takes the rows of uncertainty.csv",
     },
     ("annelid_studies.planar",),

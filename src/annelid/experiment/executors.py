@@ -45,15 +45,12 @@ def workers(executor: Executor | None, jobs: int | None = None) -> AbstractConte
     return Processes(jobs) if executor is None else nullcontext(executor)
 
 
-def answers(
-    executor: Executor, calls: Iterable[tuple[Any, ...]], meanwhile: Callable[[], object] = lambda: None
-) -> Iterator[tuple[int, Callable[[], Any]]]:
+def answers(executor: Executor, calls: Iterable[tuple[Any, ...]]) -> Iterator[tuple[int, Callable[[], Any]]]:
     """Has an executor make calls, and yields the number of each, from 0, and what gives its answer as it is there.
 
     Args:
         executor: Any.
         calls: Functions, each with its arguments.
-        meanwhile: Called in this process once all calls are handed over.
 
     Raises:
         ClusterError: By what gives an answer: the executor is lost for good.
@@ -70,7 +67,6 @@ def answers(
         for number, call in enumerate(calls):
             futures[future := executor.submit(*call)] = number
             future.add_done_callback(ended.put)
-        meanwhile()
         while futures:
             with suppress(Empty):
                 future = ended.get(timeout=POLL_S)

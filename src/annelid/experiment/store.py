@@ -11,7 +11,7 @@ import platform
 import shutil
 import tempfile
 import uuid
-from collections.abc import Callable, Iterable, Iterator, Mapping, MutableMapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, MutableMapping, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -125,7 +125,6 @@ class Store:
         *,
         progress: StudyProgress | None = None,
         failed: MutableMapping[str, Exception] | None = None,
-        meanwhile: Callable[[], object] = lambda: None,
     ) -> Mapping[str, Outcome]:
         """Runs those cases that are not there yet, the longest first.
 
@@ -135,7 +134,6 @@ class Store:
             progress: Called at the start and after every run, in place of the store's own.
             failed: Takes the error of every run that cannot be computed, by its `case_key`; None has the first such run
                 end the call.
-            meanwhile: Called in this process once the first runs are under way, or where all are there.
 
         Returns:
             The outcome by its `case_key` of every case but those that failed, in the order of the cases.
@@ -159,7 +157,6 @@ class Store:
 
         report()
         if not missing:
-            meanwhile()
             return found
         home, mark = self.folder.resolve(), self._mark()
         calls = (
@@ -167,7 +164,7 @@ class Store:
             for key in missing
         )
         with workers(self.executor) as executor:
-            for number, answer in answers(executor, calls, meanwhile):
+            for number, answer in answers(executor, calls):
                 key, case = missing[number], wanted[missing[number]]
                 try:
                     if (content := answer()) is not None:

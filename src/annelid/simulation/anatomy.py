@@ -176,14 +176,14 @@ def _unit(vectors: Array) -> Array:
     return vectors / norm(vectors)[..., np.newaxis]
 
 
-class Placed(NamedTuple):
+class Placement(NamedTuple):
     """A posture in the engine's coordinates."""
 
     qpos: Array  # generalised positions, (nq,)
     turn: Array  # rotation matrix by which it is turned as a whole from the model at rest, (3, 3)
 
 
-def laid_down(anatomy: Anatomy, body: WormBody) -> Placed:
+def start_placement(anatomy: Anatomy, body: WormBody) -> Placement:
     """Returns how a worm lies on its ground at the start; in the model it leads towards -x.
 
     It is turned to its heading. If its radius differs along it, its axis is level in the model; then it leans until the
@@ -192,15 +192,17 @@ def laid_down(anatomy: Anatomy, body: WormBody) -> Placed:
     geometry, radii, rings = anatomy.geometry, body.mesh.radii_m, anatomy.geometry.ring_planes[[0, -1]]
     if len(set(radii)) == 1:
         if not body.heading_deg:
-            return Placed(anatomy.model.qpos0.copy(), np.eye(3))
-        return turned(anatomy.model, heading_turn(body.heading_deg))
+            return Placement(anatomy.model.qpos0.copy(), np.eye(3))
+        return turned_placement(anatomy.model, heading_turn(body.heading_deg))
     lean = atan2(radii[0] - radii[-1], float(np.diff(geometry.plane_x_m[rings])[0]))
     turn = np.array([[cos(lean), 0.0, sin(lean)], [0.0, 1.0, 0.0], [-sin(lean), 0.0, cos(lean)]])
     lowest_m = float((geometry.vertices_m @ turn[2]).min())
-    return turned(anatomy.model, heading_turn(body.heading_deg) @ turn, -lowest_m)
+    return turned_placement(anatomy.model, heading_turn(body.heading_deg) @ turn, -lowest_m)
 
 
-def turned(model: mujoco.MjModel, turn: Array, lifted_m: float = 0.0, posture: Array | None = None) -> Placed:
+def turned_placement(
+    model: mujoco.MjModel, turn: Array, lifted_m: float = 0.0, posture: Array | None = None
+) -> Placement:
     """Turns a worm, at rest unless a posture is given, by a rotation matrix, ``(3, 3)``, about the model's origin.
 
     That is below its front end.
@@ -226,4 +228,4 @@ def turned(model: mujoco.MjModel, turn: Array, lifted_m: float = 0.0, posture: A
         qpos[free : free + 3] = turn @ qpos[free : free + 3]
         qpos[free + 2] += lifted_m
         mujoco.mju_mulQuat(qpos[free + 3 : free + 7], quaternion, qpos[free + 3 : free + 7].copy())
-    return Placed(qpos, turn)
+    return Placement(qpos, turn)

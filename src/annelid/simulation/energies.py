@@ -90,7 +90,7 @@ class EnergyMeter:
         return Powers(tension, damped, constrained, taken)
 
 
-def done_in(time_s: float, shortening_m: Array, before: Powers, after: Powers) -> EnergyTotals:
+def work_in_step(time_s: float, shortening_m: Array, before: Powers, after: Powers) -> EnergyTotals:
     """Returns what a step has done in which the ring actuators shortened, ``(n_muscles,)``, between two instants."""
     work = 0.5 * (before.tension + after.tension) * shortening_m
     half_s = 0.5 * time_s

@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike
 from annelid.clock import StepRatio
 from annelid.config import RunConfig
 from annelid.control.base import CallableController
-from annelid.control.trial import told, tried
 from annelid.errors import RunFileError, SimulationStopped
 from annelid.protocols import (
     Array,
@@ -62,14 +61,14 @@ def build_controller(config: RunConfig, plant: Plant) -> Controller:
     Raises:
         ConfigError: The controller cannot be built with these values.
     """
-    known, body = told(config, plant)
+    known, body = (config, plant) if config.trial is None else config.trial.known(config, plant)
     controller = known.controller.build(known, body)
     if known.turning is not None:
         from annelid.control.turning import TurningController
 
         step_s = known.clock.control_timestep_s
         controller = TurningController(controller, known.turning, plant.n_segments, plant.n_muscles, step_s)
-    return tried(controller, config, plant)
+    return controller if config.trial is None else config.trial.between(controller, config, plant)
 
 
 def as_controller(
@@ -79,9 +78,10 @@ def as_controller(
     if controller is None:
         return build_controller(config, plant)
     if hasattr(controller, "step"):
-        return tried(cast(Controller, controller), config, plant)
-    function = cast(Callable[[Sensation], ArrayLike], controller)
-    return tried(CallableController(function, plant.n_muscles), config, plant)
+        own = cast(Controller, controller)
+    else:
+        own = CallableController(cast(Callable[[Sensation], ArrayLike], controller), plant.n_muscles)
+    return own if config.trial is None else config.trial.between(own, config, plant)
 
 
 class Simulation:

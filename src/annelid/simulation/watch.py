@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.body.estimates import COLLAPSED, HARDLY, touching_ring_m
+from annelid.body.estimates import COLLAPSED, LEAST_SHORTENED, touching_ring_m
 from annelid.body.worm import WormBody
 from annelid.config import Guard
 from annelid.morphology import Array, MeshGeometry
@@ -24,7 +24,7 @@ ACTIVATED = 0.1
 LEAST_CONTRACTION_S = 0.2
 """Contractions shorter than this may be over before a cable is taut."""
 LONG_CONTRACTION_S = 0.5
-"""In a contraction as long as this, the slowest of the robots' cables shortens its ring by more than `HARDLY`."""
+"""In a contraction as long as this, the slowest of the robots' cables shortens a ring by over `LEAST_SHORTENED`."""
 LONG = 3.0
 """Length of an axial spring, over that at rest, from which a run is doubtful."""
 MOST_STRETCH = 1.1
@@ -178,7 +178,7 @@ class Watch:
                 f"in {idle.sum():.0f} of their contractions, first from {first_idle_s[idle > 0].min():.4g} s on: see "
                 f"body.rings.length_range_m, with rings of {self._ring_rest_m[segments[0] - 1]:.3g} m at rest"
             )
-        elif ring_m > (1.0 - HARDLY) * rest_m and longest_s.max() >= LONG_CONTRACTION_S:
+        elif ring_m > (1.0 - LEAST_SHORTENED) * rest_m and longest_s.max() >= LONG_CONTRACTION_S:
             found.append(
                 f"no ring was shortened by more than {100 * max(0.0, 1 - ring_m / rest_m):.2g} %, although muscles "
                 f"were active for up to {longest_s.max():.2g} s: see body.rings.{self._force_field} and the mesh's "

@@ -9,7 +9,6 @@ from typing import Any, cast
 import mujoco
 import numpy as np
 
-from annelid.arena.course import LEFT
 from annelid.arena.ground import surface_of
 from annelid.arena.surface import Plane
 from annelid.body import build_spec, compile_spec
@@ -20,11 +19,11 @@ from annelid.clock import SLACK_S, StepRatio
 from annelid.config import ArenaKind, RunConfig
 from annelid.config.answers import Walls
 from annelid.errors import SimulationStopped
-from annelid.morphology import Array, heading_turn
+from annelid.morphology import Array
 from annelid.plausibility import check, refuse_nonsense
 from annelid.protocols import SIDES, Recordable, Sensation, Signal, State, Values
-from annelid.simulation.anatomy import Anatomy, Posture, add_contact_sensors, laid_down
-from annelid.simulation.energies import EnergyTotals, Powers, done_in
+from annelid.simulation.anatomy import Anatomy, Posture, add_contact_sensors, start_placement
+from annelid.simulation.energies import EnergyTotals, Powers, work_in_step
 from annelid.simulation.ground import MovingGround
 from annelid.simulation.objects import NO_ENCOUNTER
 from annelid.simulation.skin import Touch
@@ -160,13 +159,9 @@ class WormPlant:
         self._activation: Array = np.zeros(anatomy.n_muscles)
         data = self.data = mujoco.MjData(self.model)
         self.qpos, self.act, self.ctrl, self.warned = data.qpos, data.act, data.ctrl, data.warning.number
-        self.start = laid_down(anatomy, body)
+        self.start = start_placement(anatomy, body)
         self.mechanics = body.formulation.mechanics(self.model, data, self.geometry, body, arena, self._step_s)
         self.ground = MovingGround(self.model, self.geometry, arena) if arena.has_moving_planes else None
-        if config.trial is not None:
-            ring = self.geometry.rings[self.n_segments // 2]
-            self._pushed_N = np.zeros((len(anatomy.crossing_body), 3))
-            self._pushed_N[ring] = config.trial.push_N / len(ring) * (heading_turn(body.heading_deg) @ LEFT)
         self.reset(0)
 
     @property
@@ -204,12 +199,9 @@ class WormPlant:
 
     def _move(self, activation: Array, n_steps: int, *, acts: bool) -> None:
         """As `move`, with actuators that have followed their commands unless they are to do it now."""
-        trial, rings = self._config.trial, self.anatomy.rings
+        rings = self.anatomy.rings
         skin_before = self.posture.skin
         self._activation = activation
-        if trial is not None and trial.push_N:
-            pushed = trial.push_from_s <= self._time_s < trial.push_from_s + trial.push_s
-            self.push(self._pushed_N if pushed else np.zeros_like(self._pushed_N))
         try:
             for _ in range(n_steps):
                 # What the actuators have come to at the end of a step acts in it.
@@ -232,7 +224,7 @@ class WormPlant:
         powers = self.anatomy.energy_meter.read(self.data, drive, self.mechanics.losses_W())
         before, self.posture = self.posture, self._locate()
         shortening = before.ring_length - self.posture.ring_length
-        self.energies = self.energies.plus(done_in(self._step_s, shortening, self._powers, powers))
+        self.energies = self.energies.plus(work_in_step(self._step_s, shortening, self._powers, powers))
         self._powers = powers
 
     def _prepare(self) -> None:

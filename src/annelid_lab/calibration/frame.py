@@ -26,7 +26,7 @@ from scipy.stats import binned_statistic
 from annelid.arena import Floor
 from annelid.body import WormBody, build_spec, compile_spec, crossing_site, ring_names, worm_of, wrap_factors
 from annelid.config import RunConfig
-from annelid.draw import load_frame_figure
+from annelid.draw import canvas, draw_lines, save_both
 from annelid.errors import AnnelidError, ConfigError, SimulationStopped
 from annelid.morphology import Array
 from annelid.output import write_csv
@@ -294,8 +294,17 @@ def frame_table(loops: Mapping[str, Loop]) -> Table:
 
 
 def draw_loops(loops: Mapping[str, Loop], stem: Path) -> Path:
-    """Draws loops over one another as ``.svg`` and ``.png``; returns the path of the latter."""
-    return load_frame_figure({name: (loop.displacement_m, loop.force_N) for name, loop in loops.items()}, stem)
+    """Draws loops over one another, the first in front, as ``.svg`` and ``.png``; returns the path of the latter."""
+    with canvas(3.6) as figure:
+        axes = figure.subplots()
+        lines = {name: (loop.displacement_m / MM, loop.force_N) for name, loop in loops.items()}
+        draw_lines(axes, lines, markers=False)
+        for order, line in enumerate(axes.lines):
+            line.set(zorder=3 - order, linewidth=0.9 if order else 1.6)
+        displacement = "displacement of the cable (mm); a third of it is the change of diameter"
+        axes.set(xlabel=displacement, ylabel="force of the cable (N)")
+        axes.legend(loc="upper left")
+        return save_both(figure, stem)
 
 
 def write_loop(loop: Loop, tension: Loop, path: Path) -> Path:

@@ -23,8 +23,8 @@ LEAST_OVERLAP = 0.5
 """Share of the shorter of both records that must overlap."""
 LONGEST_GAP_SAMPLES = 3.0
 """Gaps of up to so many of the log's usual steps are interpolated; longer ones are left out."""
-NEARLY = 0.001
-"""Lags whose correlation is so close to the best one's count as equally good: the smallest is taken."""
+EQUAL, NEARLY = 1e-5, 0.001
+"""Of lags whose correlation is so close to the best one's: the smallest is taken, or another one is named."""
 LEAST_PERIODIC = 0.3
 """Smallest autocorrelation one period later of a signal that counts as periodic."""
 MOST_SAMPLES = 2_000_000
@@ -148,7 +148,10 @@ def compare_series(series: Mapping[str, tuple[Array, Array, str]], log: Measured
     drift = _drift(log, ours, step_s) if given == "free" else given
     theirs = _resampled(log, drift, step_s)
     if log.log_map.lag_s == "free":
-        exact = _best(*_correlations(theirs, ours))
+        exact, second = _best(*_correlations(theirs, ours))
+        if second is not None:
+            other_s = grid[0] + second * step_s - log.time_s[0]
+            notes.append(f"a lag of {other_s:.3g} s fits nearly as well: lag_s in the map decides")
     else:
         exact = float(log.log_map.lag_s - grid[0] + log.time_s[0]) / step_s
     lag = round(exact)
@@ -330,13 +333,15 @@ def _correlations(theirs: Array, ours: Array) -> tuple[np.ndarray, Array]:
     return lags[enough], total[enough] / len(theirs)
 
 
-def _best(lags: np.ndarray, scores: Array) -> float:
-    """The smallest of the lags that are local maxima and nearly as good as the best, between samples."""
+def _best(lags: np.ndarray, scores: Array) -> tuple[float, float | None]:
+    """The best of the lags that are local maxima, between samples, and the next one that is nearly as good."""
     higher = np.maximum(np.append(scores[1:], -np.inf), np.insert(scores[:-1], 0, -np.inf))
-    good = np.flatnonzero((scores >= higher) & (scores >= scores.max() - NEARLY))
+    good = np.flatnonzero((scores >= higher) & (scores >= scores.max() - EQUAL))
     best = int(good[np.abs(lags[good]).argmin()])
     inside = 0 < best < len(lags) - 1 and lags[best + 1] - lags[best - 1] == 2
-    return float(lags[best] + (_vertex(*scores[best - 1 : best + 2]) if inside else 0.0))
+    others = [i for i in np.flatnonzero((scores >= higher) & (scores >= scores.max() - NEARLY)) if i != best]
+    second = float(lags[max(others, key=lambda i: scores[i])]) if others else None
+    return float(lags[best] + (_vertex(*scores[best - 1 : best + 2]) if inside else 0.0)), second
 
 
 def _drift(log: Measured, ours: Array, step_s: float) -> float:

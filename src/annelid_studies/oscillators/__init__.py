@@ -7,15 +7,12 @@ from annelid_studies.oscillators.phase_chain import (
     PhaseState,
     PhaseStepper,
     phase_chain,
-    steady_lags,
 )
 from annelid_studies.oscillators.shc import (
     HeteroclinicRing,
     HeteroclinicStepper,
-    bias_dwell_s,
     handover_input,
     largest_gain_per_s,
-    noise_dwell_s,
 )
 
 __all__ = [
@@ -27,10 +24,7 @@ __all__ = [
     "PhaseNetwork",
     "PhaseState",
     "PhaseStepper",
-    "bias_dwell_s",
     "handover_input",
     "largest_gain_per_s",
-    "noise_dwell_s",
     "phase_chain",
-    "steady_lags",
 ]

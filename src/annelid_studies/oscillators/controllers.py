@@ -93,10 +93,7 @@ class PhaseChain(ControllerKind):
     drive: float = Field(
         default=4.0, ge=0, le=10, description="descending drive; the body swims in 3 .. 5, rests beyond 1 .. 5"
     )
-    drive_slope_per_s: Slope = Field(default=0.0, description="change of the drive, within 0 .. 10")
-    limbs: bool = Field(default=False, description="limb oscillators force a standing wave below drive 3 (walking)")
     waves: Slope = Field(default=1.0, description="waves on the body at once; the salamander's swimming has 1")
-    coupling_per_s: Positive = Field(default=10.0, description="coupling of neighbours")
     slowing: Positive = Field(default=1.0, description="times slower than the salamander, in all of its rates")
 
     def build(self, config: RunConfig, plant: Plant) -> PhaseChainController:
@@ -203,7 +200,7 @@ class PhaseChainController(SegmentController):
     recorded = (
         ("oscillator_phase", ("oscillator",), "rad", "phase of the oscillators, not wrapped"),
         ("oscillator_amplitude", ("oscillator",), "1", "amplitude of the oscillators"),
-        ("drive", (), "1", "descending drive during the last control step"),
+        ("drive", (), "1", "descending drive"),
     )
 
     def __init__(self, config: PhaseChain, n_segments: int, n_muscles: int, control_timestep_s: float) -> None:
@@ -216,42 +213,34 @@ class PhaseChainController(SegmentController):
             control_timestep_s: Step of the oscillators, s.
         """
         super().__init__(n_segments, n_muscles)
-        self._config = config
-        self._timestep_s = control_timestep_s
+        self._drive = config.drive
         self._lag = 2.0 * np.pi * config.waves / n_segments
-        network = phase_chain(n_segments, self._lag, config.coupling_per_s, config.limbs)
+        network = phase_chain(n_segments, self._lag)
         # A slower animal is the same one in shorter steps.
         self._stepper = PhaseStepper(network, control_timestep_s / config.slowing)
         self.reset(0)
 
     def reset(self, seed: int) -> None:
         """Returns to the initial wave; nothing here is random."""
-        limbs = [0.0, np.pi] if self._config.limbs else []
-        phase = np.append(-self._lag * np.arange(self.n_segments), limbs)
-        self._now = vars(self._stepper.initial_state(self._drive(0), phase)) | {"n_steps": np.array(0)}
+        phase = -self._lag * np.arange(self.n_segments)
+        self._now = dict(vars(self._stepper.initial_state(self._drive, phase)))
 
     def step(self, sensation: Sensation) -> Array:
         """Advances by one control step, as `SegmentController.step`; nothing is sensed."""
         now = self._now
         state = PhaseState(now["phase_rad"], now["amplitude"], now["amplitude_rate_per_s"])
-        state = self._stepper.advance(state, self._drive(int(now["n_steps"])))
+        state = self._stepper.advance(state, self._drive)
         now |= vars(state)
-        now["n_steps"] += 1
-        output = self._stepper.output(state)[0, : self.n_segments]
+        output = self._stepper.output(state)[0]
         most = 2.0 * float(BODY.amplitude(BODY.highest_drive))
         return np.clip(output / most, 0.0, 1.0).repeat(self.muscles_per_segment)
-
-    def _drive(self, n_steps: int) -> float:
-        drive = self._config.drive + self._config.drive_slope_per_s * n_steps * self._timestep_s
-        return min(max(drive, 0.0), 10.0)
 
     def _values(self) -> Values:
         return {
             "oscillator_phase": self._now["phase_rad"][0].copy(),
             "oscillator_amplitude": self._now["amplitude"][0].copy(),
-            "drive": self._drive(max(int(self._now["n_steps"]) - 1, 0)),
+            "drive": self._drive,
         }
 
     def _coords(self) -> dict[str, list[int] | list[str]]:
-        limbs = ["fore_limb", "hind_limb"] if self._config.limbs else []
-        return {"oscillator": [f"body_{segment}" for segment in range(1, self.n_segments + 1)] + limbs}
+        return {"oscillator": [f"body_{segment}" for segment in range(1, self.n_segments + 1)]}

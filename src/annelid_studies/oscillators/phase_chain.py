@@ -8,9 +8,9 @@ to walking with a salamander robot driven by a spinal cord model", Science 315, 
     x_i = r_i (1 + cos theta_i)
 
 Intrinsic frequency nu and amplitude R are linear in the drive d within an oscillator's range and 0 outside. With d
-rising the animal rests, walks (from 1: limbs force their slow rhythm and a standing wave on the body), swims (from 3:
-limbs saturate, the body is left with its own faster travelling wave), and falls silent (from 5). The salamander has two
-such chains in antiphase, where their coupling vanishes; one side is enough for a worm, whose muscles are rings.
+rising from 1 the body swims with a travelling wave, and falls silent beyond 5. The salamander has two such chains in
+antiphase, where their coupling vanishes, and limbs; one side without limbs is enough for a worm, whose muscles are
+rings.
 """
 
 from __future__ import annotations
@@ -60,13 +60,10 @@ class DriveResponse:
 
 # The salamander's constants: Ijspeert et al. 2007, Table S1. Rates are 1/s.
 BODY = DriveResponse(1.0, 5.0, 0.2, 0.3, 0.065, 0.196)
-LIMB = DriveResponse(1.0, 3.0, 0.2, 0.0, 0.131, 0.131)
 AMPLITUDE_RATE_PER_S = 20.0
 """a, the rate at which amplitudes settle."""
 BODY_COUPLING_PER_S = 10.0
-"""w between body oscillators and between limb oscillators."""
-LIMB_COUPLING_PER_S = 30.0
-"""w from a limb to the body oscillators of its girdle."""
+"""w between neighbours."""
 
 
 @dataclass(frozen=True)
@@ -106,55 +103,24 @@ class PhaseNetwork:
         return np.stack([of_kind[response] for response in self.responses], axis=-1)
 
 
-def phase_chain(
-    n_body: int, lag_rad: float | None = None, coupling_per_s: float = BODY_COUPLING_PER_S, limbs: bool = False
-) -> PhaseNetwork:
-    """Builds one side of the salamander's network for any number of segments; Ijspeert et al. 2007, Fig. 1.
+def phase_chain(n_body: int, lag_rad: float | None = None, coupling_per_s: float = BODY_COUPLING_PER_S) -> PhaseNetwork:
+    """Builds one side of the salamander's body for any number of segments; Ijspeert et al. 2007, Fig. 1.
 
     Args:
-        n_body: Body oscillators in a chain, at least 2, coupled to their neighbours in both directions.
+        n_body: Oscillators in a chain, at least 2, coupled to their neighbours in both directions.
         lag_rad: Phase by which each follows the one before it, rad; default one wave on the body, 2 pi / n_body.
-        coupling_per_s: w within the body and between the limbs, 1/s.
-        limbs: Adds two limb oscillators at the end, the fore limb's and the hind limb's, in antiphase with each
-            other; each acts on the oscillators of its half of the body (the front half has the middle one) with
-            phi = pi, three times as strongly as those act on one another.
+        coupling_per_s: w, 1/s.
 
     Raises:
-        ConfigError: Fewer than 2 body oscillators.
+        ConfigError: Fewer than 2 oscillators.
     """
     require_at_least(2, n_body=n_body)
-    n = n_body + 2 * limbs
-    weight, bias = np.zeros((n, n)), np.zeros((n, n))
+    weight, bias = np.zeros((n_body, n_body)), np.zeros((n_body, n_body))
     front = np.arange(n_body - 1)
     weight[front, front + 1] = weight[front + 1, front] = coupling_per_s
     lag = 2.0 * np.pi / n_body if lag_rad is None else lag_rad
     bias[front + 1, front], bias[front, front + 1] = lag, -lag
-    if limbs:
-        fore, hind, middle = n_body, n_body + 1, (n_body + 1) // 2
-        strong = coupling_per_s * LIMB_COUPLING_PER_S / BODY_COUPLING_PER_S
-        weight[:middle, fore] = weight[middle:n_body, hind] = strong
-        weight[fore, hind] = weight[hind, fore] = coupling_per_s
-        bias[:middle, fore] = bias[middle:n_body, hind] = bias[fore, hind] = bias[hind, fore] = np.pi
-    return PhaseNetwork((BODY,) * n_body + (LIMB,) * (2 * limbs), weight, bias)
-
-
-def steady_lags(frequency_Hz: ArrayLike, amplitude: float, coupling_per_s: float, lag_rad: float) -> Array:
-    """Returns the phases by which neighbours of a locked chain follow one another, rad, ``(.., n - 1)``.
-
-    With equal amplitudes R the couplings cancel in the sum over all, so the common frequency is the mean of the
-    intrinsic ones; balance of the first k oscillators then gives ``theta_k - theta_{k+1} = lag + arcsin(2 pi sum_{i<=k}
-    (nu_i - mean nu) / (w R))``, and NaN where the chain cannot lock.
-
-    Args:
-        frequency_Hz: Intrinsic frequencies along the chain, Hz, ``(.., n)``.
-        amplitude: Amplitude R of all.
-        coupling_per_s: w, 1/s.
-        lag_rad: Phase bias from each to the next, rad.
-    """
-    nu = np.asarray(frequency_Hz, dtype=float)
-    excess = np.cumsum(nu - nu.mean(axis=-1, keepdims=True), axis=-1)[..., :-1]
-    with np.errstate(invalid="ignore"):
-        return lag_rad + np.arcsin(2.0 * np.pi * excess / (coupling_per_s * amplitude))
+    return PhaseNetwork((BODY,) * n_body, weight, bias)
 
 
 @dataclass

@@ -9,10 +9,8 @@ With rho_ii = alpha every x = e_i is a saddle, near which x_j grows at the rate 
 successor of i (its only unstable direction, lambda_u) and -alpha for all others (so lambda_s = alpha). The ring of
 saddles attracts for a saddle value nu = lambda_s / lambda_u above 1.
 
-Near e_i the successor obeys dx = (lambda_u x + mu) dt + epsilon dW, reflected at 0, starting from its value while it
-decayed at the rate lambda_s. Its exponentially growing part has, without noise, the amplitude
-mu (1/lambda_u + 1/lambda_s); without mu, it is the modulus of a Gaussian of variance
-epsilon^2 (1/lambda_u + 1/lambda_s) / 2. From this follow the dwell times below.
+Near e_i the successor obeys dx = (lambda_u x + mu) dt + epsilon dW, reflected at 0. So a node is left after about
+ln(1 / mu) / lambda_u or ln(1 / epsilon) / lambda_u; tests/studies/test_shc.py has the dwell times in closed form.
 """
 
 from __future__ import annotations
@@ -62,38 +60,6 @@ class HeteroclinicRing:
         node = np.arange(self.n_nodes)
         rho[(node + 1) % self.n_nodes, node] = alpha - self.leaving_rate_per_s
         return rho
-
-
-def noise_dwell_s(ring: HeteroclinicRing, noise: ArrayLike, distance: ArrayLike = 0.5) -> Array:
-    """Returns the mean time, s, that noise alone takes to leave a node, in the limit of small noise.
-
-    ``<T> = (ln(delta / epsilon) + (gamma + ln(4 lambda_u lambda_s / (lambda_u + lambda_s))) / 2) / lambda_u`` with
-    Euler's gamma, as ``<ln|Z|> = -(gamma + ln 2) / 2`` for a standard normal Z (Stone and Holmes 1990, "Random
-    perturbations of heteroclinic attractors", eq. 2.28). Its standard deviation is ``pi / (sqrt(8) lambda_u)``.
-
-    Args:
-        ring: The ring.
-        noise: epsilon, 1/sqrt(s), any shape.
-        distance: delta, the successor's activity that counts as having left, small beside 1.
-    """
-    leave, settle = ring.leaving_rate_per_s, ring.growth_rate_per_s
-    constant = 0.5 * (np.euler_gamma + np.log(4.0 * leave * settle / (leave + settle)))
-    return (np.log(np.asarray(distance) / np.asarray(noise)) + constant) / leave
-
-
-def bias_dwell_s(ring: HeteroclinicRing, bias_per_s: ArrayLike, distance: ArrayLike = 0.5) -> Array:
-    """Returns the time, s, that a constant input alone takes to leave a node, in the limit of a small one.
-
-    ``T = ln(delta lambda_u lambda_s / (mu (lambda_u + lambda_s))) / lambda_u``.
-
-    Args:
-        ring: The ring.
-        bias_per_s: mu, 1/s, any shape.
-        distance: delta, as for `noise_dwell_s`.
-    """
-    leave, settle = ring.leaving_rate_per_s, ring.growth_rate_per_s
-    reach = np.asarray(distance) * leave * settle / (leave + settle)
-    return np.log(reach / np.asarray(bias_per_s)) / leave
 
 
 def largest_gain_per_s(ring: HeteroclinicRing) -> float:

@@ -11,7 +11,14 @@ from numpy.typing import ArrayLike
 from pydantic import Field
 
 from annelid.body.actuators import ActuatorKind, PerSegment, Slopes
-from annelid.body.estimates import SHRUNK, UNSURE, bearable_force_N, crushes, rhombus_of, weak
+from annelid.body.estimates import (
+    ESTIMATE_FACTOR,
+    MOST_SHRUNK_AT_REST,
+    bearable_force_N,
+    crush_findings,
+    rhombus_of,
+    weakness_findings,
+)
 from annelid.body.mesh import MeshBody
 from annelid.config.answers import Finding
 from annelid.config.sections import Positive
@@ -164,12 +171,12 @@ def _findings(body: MeshBody, rings: Rings, low: float, high: float, force_N: fl
     field, fitting = "body.rings.length_range_m", f"set [{0.59 * rest:.3g}, {1.11 * rest:.3g}]"
     if passive > 0.1 * bearable:
         # Its passive force ends at the optimal length.
-        shrunk = low + (1.0 - LOWEST_MUSCLE) * optimal < SHRUNK * rest
+        shrunk = low + (1.0 - LOWEST_MUSCLE) * optimal < MOST_SHRUNK_AT_REST * rest
         problem = (
             f"a ring is {rest:.3g} m long at rest, so that its muscle pulls {passive:.3g} N before anything is "
             f"activated, where the mesh bears about {bearable:.2g} N"
         )
-        severity = "error" if passive > UNSURE * bearable and shrunk else "warning"
+        severity = "error" if passive > ESTIMATE_FACTOR * bearable and shrunk else "warning"
         yield Finding(field, [low, high], problem, fitting, severity)
     elif _active_share(at_rest, rings) < 0.02:
         where = f"at any length below {none:.3g} m" if at_rest < 1.0 else "beyond its longest length"
@@ -183,8 +190,10 @@ def _findings(body: MeshBody, rings: Rings, low: float, high: float, force_N: fl
         most = MOST_OVER * bearable / _active_share(at_rest, rings)
         yield Finding(f"body.rings.{rings.force_field}", force_N, problem, f"set at most {most:.2g}")
     else:
-        yield from weak(body, rings.force_field, force_N, pull)
-    yield from crushes(rings.force_field, force_N, bearable, _settled_m(body, rings, none, optimal, force_N) / rest)
+        yield from weakness_findings(body, rings.force_field, force_N, pull)
+    yield from crush_findings(
+        rings.force_field, force_N, bearable, _settled_m(body, rings, none, optimal, force_N) / rest
+    )
 
 
 def _settled_m(body: MeshBody, rings: Rings, none_m: float, optimal_m: float, force_N: float) -> float:

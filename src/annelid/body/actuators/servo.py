@@ -11,7 +11,14 @@ from numpy.typing import ArrayLike
 from pydantic import Field
 
 from annelid.body.actuators import ActuatorKind, MotorPower, PerSegment, Slopes
-from annelid.body.estimates import SHRUNK, UNSURE, bearable_force_N, crushes, rhombus_of, weak
+from annelid.body.estimates import (
+    ESTIMATE_FACTOR,
+    MOST_SHRUNK_AT_REST,
+    bearable_force_N,
+    crush_findings,
+    rhombus_of,
+    weakness_findings,
+)
 from annelid.body.mesh import MeshBody
 from annelid.config.answers import Finding
 from annelid.config.sections import NonNegative, Positive, Range
@@ -198,7 +205,7 @@ def _findings(body: MeshBody, rings: ServoRings, low: float, high: float, force_
     if low >= rest:
         severity, problem = "error", f"even the shortest cable of {low:.3g} m pulls 0 N"
     elif idle > 0.1 * bearable:
-        severity = "error" if idle > UNSURE * bearable and high < SHRUNK * rest else "warning"
+        severity = "error" if idle > ESTIMATE_FACTOR * bearable and high < MOST_SHRUNK_AT_REST * rest else "warning"
         problem = (
             f"the longest cable of {high:.3g} m pulls {idle:.3g} N before anything is activated, where the mesh bears "
             f"about {bearable:.2g} N"
@@ -214,6 +221,6 @@ def _findings(body: MeshBody, rings: ServoRings, low: float, high: float, force_
         )
         yield Finding("body.rings.length_range_m", [low, high], problem, fitting, severity)
     if low < rest:
-        yield from weak(body, "stiffness_N_per_m", rings.stiffness_N_per_m, rate * (rest - low))
-        yield from weak(body, rings.force_field, force_N, force_N)
-        yield from crushes(rings.force_field, force_N, bearable, low / rest)
+        yield from weakness_findings(body, "stiffness_N_per_m", rings.stiffness_N_per_m, rate * (rest - low))
+        yield from weakness_findings(body, rings.force_field, force_N, force_N)
+        yield from crush_findings(rings.force_field, force_N, bearable, low / rest)

@@ -1,4 +1,4 @@
-"""Figures of experiments: loops of a load frame, a search for a gait, and values with error bars."""
+"""Figures of experiments: a search for a gait, and values with error bars."""
 
 from __future__ import annotations
 
@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from annelid.draw.canvas import canvas, draw_lines, panel_title, save, save_both, segment_colors
+from annelid.draw.canvas import canvas, panel_title, save, save_both, segment_colors
 from annelid.protocols import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_MM = 1e3
 _DOT, _BEST, _START, _ = segment_colors(4)
 _WIDTHS_PT = (9.0, 5.0, 2.0)
 _LEAST_SHARE = 0.02
@@ -25,26 +24,6 @@ _UNCERTAIN = {
 }
 """Panels of error bars: how the names of their quantities begin, and what a value is multiplied by."""
 _NESTED = ("parameters", "time_step", "elements")
-
-
-def load_frame_figure(loops: Mapping[str, tuple[ArrayLike, ArrayLike]], stem: str | Path) -> Path:
-    """Draws loops of a ring cable's force, N, over its displacement, m, ``(n,)`` each, the first in front.
-
-    Writes ``<stem>.svg`` and ``.png``, as the two below, and returns the latter's path.
-
-    Args:
-        loops: Displacements and forces of each loop by its name.
-        stem: Path of both files without a suffix.
-    """
-    with canvas(3.6) as figure:
-        axes = figure.subplots()
-        draw_lines(axes, {name: (_MM * np.asarray(x), y) for name, (x, y) in loops.items()}, markers=False)
-        for order, line in enumerate(axes.lines):
-            line.set(zorder=3 - order, linewidth=0.9 if order else 1.6)
-        displacement = "displacement of the cable (mm); a third of it is the change of diameter"
-        axes.set(xlabel=displacement, ylabel="force of the cable (N)")
-        axes.legend(loc="upper left")
-        return save_both(figure, stem)
 
 
 def progress_figure(values: ArrayLike, label: str, more_is_better: bool, stem: str | Path) -> Path:

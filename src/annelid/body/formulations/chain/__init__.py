@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 
 from pydantic import Field
 
-from annelid.body.estimates import rhombus_of, softened
+from annelid.body.estimates import rhombus_of, soft_constraint
 from annelid.body.formulations import FormulationKind
 from annelid.body.mesh import MeshBody
 from annelid.config.answers import Finding
@@ -51,7 +51,7 @@ class Chain(FormulationKind):
             instead = f"set at most {most / 2:.1g}, or a larger body.formulation.armature_kg_m2"
             yield Finding("clock.physics_timestep_s", step, problem, instead)
         if self.pin_time_constant_s < 2.0 * step:
-            yield softened("body.formulation.pin_time_constant_s", self.pin_time_constant_s, "pins", step)
+            yield soft_constraint("body.formulation.pin_time_constant_s", self.pin_time_constant_s, "pins", step)
 
     def add(
         self, spec: mujoco.MjSpec, geometry: MeshGeometry, body: MeshBody, arena: ArenaKind, *, for_plant: bool

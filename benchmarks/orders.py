@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from annelid.analysis import Gait, gait
+from annelid.analysis import Summary, summary
 from annelid.config import load_config
 from annelid.control import CircuitController
 from annelid.control.sns import Sns
@@ -57,10 +57,10 @@ class Worm(NamedTuple):
     held: bool = False
 
 
-READ: dict[str, Callable[[Gait], float | None]] = {
-    "muscles' work (J)": lambda found: None if found.energy is None else found.energy.muscle_work_J,
+READ: dict[str, Callable[[Summary], float | None]] = {
+    "muscles' work (J)": lambda found: found.energy_muscle_work_J,
     "travel a cycle (mm)": lambda found: None if found.stride_m is None else 1e3 * found.stride_m,
-    "period (s)": lambda found: found.period_s,
+    "period (s)": lambda found: found.gait_period_s,
 }
 WORK, TRAVEL, PERIOD = READ
 WORMS = (
@@ -87,7 +87,7 @@ def measured(number: int, step_ms: int) -> list[float]:
         assert isinstance(config.controller, Sns)
         controller = HeldSensors(config.controller.circuit(config, n), n, config.clock.control_timestep_s)
     with tempfile.TemporaryDirectory() as folder:
-        found = gait(simulate(config, folder, controller=controller, progress=False))
+        found = summary(simulate(config, folder, controller=controller, progress=False))
     values = [READ[name](found) for name in one.numbers]
     return [math.nan if value is None else value for value in values]
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from annelid.analysis import Gait, gait
 from annelid.config import load_config
-from annelid.control import SnsController
+from annelid.control import CircuitController
 from annelid.control.sns import Sns
 from annelid.experiment import Processes
 from annelid.output import write_csv
@@ -39,7 +39,7 @@ SLOW = {
 LOOP = {"arena.friction": 0.3, "duration_s": 10.0}
 
 
-class HeldSensors(SnsController):
+class HeldSensors(CircuitController):
     """The paper's network; between two movements of the body it takes the last lengths, not those carried on."""
 
     def stride(self, sensation: Sensation, n_steps: int) -> Array:
@@ -85,7 +85,7 @@ def measured(number: int, step_ms: int) -> list[float]:
     if one.held:
         n = config.body.n_segments
         assert isinstance(config.controller, Sns)
-        controller = HeldSensors(config.controller, config.sensor, n, n, config.clock.control_timestep_s)
+        controller = HeldSensors(config.controller.circuit(config, n), n, config.clock.control_timestep_s)
     with tempfile.TemporaryDirectory() as folder:
         found = gait(simulate(config, folder, controller=controller, progress=False))
     values = [READ[name](found) for name in one.numbers]

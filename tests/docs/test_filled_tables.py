@@ -28,7 +28,6 @@ WAITING: tuple[str, ...] = ()
 EXCEPTIONS = {
     ("docs/challenge.md", "entrant"): "what was searched, not results",
     ("docs/environments.md", "numbers"): "spaces of the environment, not results: tests/environments compares them",
-    ("docs/environments.md", "number"): "the same",
     ("docs/explanation/equations.md", "symbol"): "values of presets, which test_equations compares",
     ("docs/explanation/equations.md", "conductance"): "the same",
     ("docs/explanation/equations.md", "equation"): "numbers of equations",

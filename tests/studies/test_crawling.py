@@ -39,7 +39,7 @@ def test_longer_worms_have_rings_as_strong_as_the_second_and_ends_as_before(subt
 
 
 def test_planar_worms_are_refused() -> None:
-    with pytest.raises(ConfigError, match="needs a 3D worm"):
+    with pytest.raises(ConfigError, match="needs the 3D worm"):
         runs(["riddle2022-planar"], "quick")
 
 

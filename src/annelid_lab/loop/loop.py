@@ -130,6 +130,6 @@ def drive(
 def _interface(config: RunConfig, body: Plant, senses: Sequence[str] | None) -> Interface:
     if senses is None:
         configured = build_controller(config.model_copy(update={"trial": None}), body)
-        senses = getattr(configured, "senses", ("lengthening_m",))
+        senses = list(getattr(configured, "senses", ("lengthening_m",)))
     timestep_us = round(1e6 * config.clock.control_timestep_s)
     return Interface(tuple(senses), body.n_segments, body.n_muscles, timestep_us)

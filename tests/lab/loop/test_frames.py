@@ -173,9 +173,9 @@ class CPeer:
 
 def c_peer(folder: Path, real: Any = "double", preset: str = "riddle2023-rods") -> tuple[CPeer, Any, Interface]:
     config = annelid.load_config(preset)
-    controller: Any = annelid.build_controller(config, annelid.build_plant(config))
-    code = controller.code()
-    interface = Interface(code.senses, code.n_segments, code.n_muscles, 1000)
+    plant = annelid.build_plant(config)
+    controller: Any = annelid.build_controller(config, plant)
+    interface = Interface(controller.senses, plant.n_segments, plant.n_muscles, 1000)
     return CPeer(controller_firmware(controller, "worm", real=real), folder), controller, interface
 
 

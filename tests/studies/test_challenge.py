@@ -19,6 +19,7 @@ from annelid_studies.challenge import report, scores, tasks
 from annelid_studies.challenge.ranking import ALL, agreement, mean_speeds, standings
 from annelid_studies.challenge.scores import Score, challenge, electric_energy_J, read_scores
 from annelid_studies.challenge.tasks import REFERENCE, Entrant, all_tasks, entries, find_entrants
+from annelid_studies.faults import Faults
 
 pytestmark = pytest.mark.usefixtures("runs_in_this_process")
 
@@ -68,14 +69,15 @@ def test_a_task_makes_blind_runs_whose_step_can_be_halved(subtests: pytest.Subte
             reference = {REFERENCE: find_entrants([])[REFERENCE]}
             [whole], [half] = (entries(reference, [name], [1000], finer=finer) for finer in (1, 2))
             config = whole.case.config
-            assert config.trial is not None
-            assert config.trial.blind
+            faults = config.trial
+            assert isinstance(faults, Faults)
+            assert faults.blind
             assert half.case.config.clock.physics_timestep_s == config.clock.physics_timestep_s / 2
             assert half.case.config.clock.control_timestep_s == config.clock.control_timestep_s
             event_s = all_tasks().tasks[name].event_s
             if event_s is not None:
-                ends = [config.trial.weak_from_s, config.trial.silent_s, config.trial.random_s]
-                ends.append(config.trial.push_from_s + config.trial.push_s if config.trial.push_N else 0.0)
+                ends = [faults.weak_from_s, faults.silent_s, faults.random_s]
+                ends.append(faults.push_from_s + faults.push_s if faults.push_N else 0.0)
                 assert max(ends) == event_s
 
 

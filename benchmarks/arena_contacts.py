@@ -22,7 +22,7 @@ from annelid.arena.kinds.floor import Floor
 from annelid.arena.kinds.pipe import Pipe
 from annelid.arena.surface import surface_of
 from annelid.body import build_spec, compile_spec
-from annelid.body.rows import tendons_to_rows
+from annelid.body.constraint_rows import tendons_to_rows
 from annelid.body.worm import WormBody
 from annelid.config import ArenaKind, RunConfig, load_config
 from annelid.output import write_csv

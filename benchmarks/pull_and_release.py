@@ -43,6 +43,7 @@ import numpy as np
 from annelid.simulation.two_step import TwoStep
 
 from annelid.body import compile_spec
+from annelid.body.constraint_rows import add_row, tendons_to_rows
 from annelid.body.formulations import BDF2_SHARE
 from annelid.body.formulations.chain import Chain
 from annelid.body.formulations.chain.capsules import SOLVER_ITERATIONS, add_chain
@@ -50,7 +51,6 @@ from annelid.body.formulations.rods import Rods
 from annelid.body.formulations.rods.net import add_rod, add_vertex, lumped_masses
 from annelid.body.formulations.rods.strains import RodStrains, vertex_stiffness
 from annelid.body.mesh import Strands
-from annelid.body.rows import add_row, tendons_to_rows
 from annelid.config import load_config
 from annelid.morphology import Array, helical_mesh
 from annelid.output import write_csv

@@ -12,7 +12,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from annelid import load_config, simulate
-from annelid.analysis.passage import passage_of
+from annelid.analysis.pipe_passage import passage_of
 from annelid.draw.figures.track import track_figure
 
 PIPE = """

@@ -17,7 +17,7 @@ from rich.console import Console
 from rich.table import Table
 
 from annelid import load_config, simulate
-from annelid.analysis.passage import passage_of
+from annelid.analysis.pipe_passage import passage_of
 
 GAITS = {"fixed": {}, "adaptive": {"controller.descending.lift": 0.45}}
 

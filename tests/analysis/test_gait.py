@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from annelid.analysis import Energy, Gait, energy_balance, gait, summary
 from annelid.analysis.track import fitted_circle
 from annelid.config import check_config
-from annelid.draw.table import summary_rows
+from annelid.draw.summary_table import summary_rows
 from annelid.simulation.runfile import Run
 from synthetic import wave_data
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from annelid.analysis.passage import Passage, passage_through
+from annelid.analysis.pipe_passage import Passage, passage_through
 from annelid.analysis.track import Track
 from annelid.arena.kinds.pipe import Pipe
 from annelid.body.mesh import Mesh

@@ -8,13 +8,13 @@ import mujoco
 import numpy as np
 import pytest
 
+from annelid.body.constraint_rows import tendons_to_rows
 from annelid.body.formulations.chain.capsules import add_chain
 from annelid.body.formulations.rods import Rods
 from annelid.body.formulations.rods.net import add_rod, add_vertex, lumped_masses
 from annelid.body.formulations.rods.strains import RodStrains, vertex_stiffness
 from annelid.body.formulations.rods.two_step import TwoStep
 from annelid.body.mesh import Strands
-from annelid.body.rows import tendons_to_rows
 
 LENGTH_M = 0.6
 ELEMENTS = 24

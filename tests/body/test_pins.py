@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from annelid.body.constraint_rows import Ties, add_tie, tendons_to_rows
 from annelid.body.formulations import Tie
 from annelid.body.formulations.rods.net import add_vertex
-from annelid.body.rows import Ties, add_tie, tendons_to_rows
 from annelid.config import load_config
 from annelid.simulation.worm import WormPlant
 

@@ -22,6 +22,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.linalg import eig
 
+from annelid.body.constraint_rows import HELD, tendons_to_rows
 from annelid.body.formulations import BDF2_SHARE
 from annelid.body.formulations.chain.capsules import add_chain
 from annelid.body.formulations.rods import Rods
@@ -29,7 +30,6 @@ from annelid.body.formulations.rods.net import add_rod, add_vertex, lumped_masse
 from annelid.body.formulations.rods.strains import RodStrains, vertex_stiffness
 from annelid.body.formulations.rods.two_step import TwoStep
 from annelid.body.mesh import Strands
-from annelid.body.rows import HELD, tendons_to_rows
 from annelid.morphology import Array
 from annelid.simulation import worm as _engine_warnings_go_to_the_log  # noqa: F401
 

@@ -18,7 +18,7 @@ from annelid.config import load_config
 from annelid.errors import ConfigError
 from annelid.experiment import store as runs
 from annelid.experiment.case import Case
-from annelid.experiment.judge import Judged, judge
+from annelid.experiment.gait_criteria import Judged, judge
 from annelid.experiment.outcome import Outcome
 from annelid.experiment.space import Choice, Interval, from_unit
 from annelid.experiment.store import Store, case_key

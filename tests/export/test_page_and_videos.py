@@ -70,7 +70,7 @@ def test_a_gif_shows_the_frames_of_the_window_at_its_rate(planar_run: Run, tmp_p
 
 
 def test_formats_are_listed_as_the_help_says() -> None:
-    from annelid.cli.results import export_command
+    from annelid.cli.see import export_command
     from annelid.export import FORMATS
 
     lines = re.findall(r"^    ((?:\w+ )+) +\w", export_command.__doc__ or "", re.MULTILINE)

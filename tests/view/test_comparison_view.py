@@ -10,7 +10,7 @@ from rich.table import Table
 
 from annelid.analysis.comparison import compare
 from annelid.draw.figures.comparison import lengths_figure, potentials_figure, travel_figure
-from annelid.draw.table import comparison_table, fields_table
+from annelid.draw.summary_table import comparison_table, fields_table
 from annelid.errors import RunFileError
 from annelid.simulation.runfile import Run
 

@@ -12,7 +12,7 @@ from rich.console import Console
 from annelid.analysis.paper import formulation
 from annelid.analysis.summary import Summary, summary
 from annelid.config import load_config
-from annelid.draw.table import closing_sentence, legend, summary_rows, summary_table
+from annelid.draw.summary_table import closing_sentence, legend, summary_rows, summary_table
 from annelid.simulation.runfile import Run
 
 FAST = load_config("riddle2023-fast")

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
         PAPER_MIDDLE_DEFICIT,
         ROBOT_ELONGATION_M,
     )
-    from annelid.analysis.passage import Passage, passage_of
+    from annelid.analysis.pipe_passage import Passage, passage_of
     from annelid.analysis.rhythm import (
         CONTRACTED,
         DESIGN_INTERVAL_S,

@@ -10,16 +10,16 @@ ground (docs/arenas.md).
 from __future__ import annotations
 
 from math import sqrt
-from typing import Any
 
 import mujoco
 import numpy as np
 
+from annelid.arena.friction import contact_options
 from annelid.arena.surface import Shape
 from annelid.config.answers import Walls
 from annelid.config.run import ArenaKind
 from annelid.errors import ConfigError, shortened
-from annelid.morphology import Array, MeshGeometry
+from annelid.morphology import Array
 
 PLAIN_RGBA, GROUND_RGBA = (0.5, 0.5, 0.5, 1.0), (0.72, 0.75, 0.78, 1.0)
 """Of a geom in MJCF that states no colour, and what a scene shows instead where it is at rest."""
@@ -37,24 +37,6 @@ RAIL_RGBA = (0.55, 0.6, 0.66, 0.45)
 PIPE_RGBA = (0.62, 0.72, 0.80, 0.28)
 SCENE = "scene/"
 """What the names of a scene begin with in a worm's model."""
-
-
-def contact_options(arena: ArenaKind, relative_friction: float = 1.0) -> dict[str, Any]:
-    """Contact attributes that worm and floor share, so that neither dilutes the other's; skin may have other friction.
-
-    Of two geoms the engine takes the greater friction, unless one has priority.
-    """
-    return {
-        "friction": [relative_friction * arena.friction, 0.005, 0.0001],
-        "priority": int(relative_friction != 1.0),
-        "solref": [arena.contact_time_constant_s, 1.0],
-        "solimp": [*arena.contact_impedance, 0.5, 2.0],
-    }
-
-
-def skin_options(arena: ArenaKind, geometry: MeshGeometry, relative: list[float], x_m: Array) -> list[dict[str, Any]]:
-    """Contact attributes of skin at places along the body at rest, m, from the relative friction of every segment."""
-    return [contact_options(arena, float(share)) for share in geometry.along(relative, x_m)]
 
 
 def skin_geoms(spec: mujoco.MjSpec) -> list[mujoco.MjsGeom]:
@@ -84,15 +66,6 @@ def add_moving_planes(spec: mujoco.MjSpec, arena: ArenaKind) -> None:
         friction = [slide, slide, spin, roll, roll]
         spec.add_pair(name=name, geomname1=name, geomname2=geom.name, condim=3, friction=friction, **options)
         geom.conaffinity = int(arena.walls != Walls())
-
-
-def set_friction(model: mujoco.MjModel, friction: float) -> None:
-    """Gives skin and ground of a compiled worm another coefficient of sliding friction, from the next step on.
-
-    A worm with setae sets its own before every step, and one whose segments rub differently cannot be given one.
-    """
-    model.geom_friction[(model.geom_contype != 0) | (model.geom_conaffinity != 0), 0] = friction
-    model.pair_friction[:, :2] = friction
 
 
 def add_box(spec: mujoco.MjSpec, arena: ArenaKind, place_m: Array, half_size_m: list[float], axes: Array) -> None:

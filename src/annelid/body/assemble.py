@@ -43,9 +43,9 @@ def build_spec(config: RunConfig, *, for_plant: bool = False) -> mujoco.MjSpec:
     Args:
         config: The run's configuration; ``body`` must be a 3D worm.
         for_plant: For a plant of annelid, which prepares every step: rows whose coefficients follow the posture
-            (`annelid.body.rows`), and where the engine has no one plane for the ground planes that are laid under
-            the skin (`annelid.simulation.ground`), with nothing to see. Else a model that moves by itself: the
-            engine's rods, all that is seen, and panels that support the worm in plain MuJoCo.
+            (`annelid.body.constraint_rows`), and where the engine has no one plane for the ground planes that are
+            laid under the skin (`annelid.simulation.ground`), with nothing to see. Else a model that moves by itself:
+            the engine's rods, all that is seen, and panels that support the worm in plain MuJoCo.
 
     Returns:
         A spec of its own for every call; compile it as it is or a copy of it.

@@ -46,7 +46,7 @@ from annelid.cli.entry import (
     study,
     typed_command,
 )
-from annelid.cli.result import give, give_files, refuse_json, wants_json
+from annelid.cli.json_output import give, give_files, refuse_json, wants_json
 from annelid.cli.run import locked_folder
 from annelid.registry import COMMANDS, load_extensions, load_home
 
@@ -97,6 +97,6 @@ __all__ = [
 ]
 
 # The help lists commands in this order.
-for _home in ("run", "worm", "results", "vary", "lists"):
+for _home in ("run", "check", "see", "vary", "lists"):
     load_home(f"annelid.cli.{_home}")
 load_extensions(COMMANDS)

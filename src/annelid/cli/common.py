@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from annelid.cli.entry import EXIT_INTERRUPTED, complain, lock, typed_command
-from annelid.cli.result import give_files, records, wants_json
+from annelid.cli.json_output import give_files, records, wants_json
 from annelid.errors import RunFileError
 
 if TYPE_CHECKING:
@@ -288,7 +288,7 @@ def print_run(run: Run, *, quiet: bool = False, check: Check | None = None) -> N
         check: What finer runs have found.
     """
     from annelid.analysis import summary
-    from annelid.draw.table import closing_sentence, summary_table
+    from annelid.draw.summary_table import closing_sentence, summary_table
     from annelid.terminal import Console
 
     numbers = summary(run)

@@ -18,7 +18,7 @@ from typing import Annotated, Any, TextIO
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from annelid.cli.result import with_json
+from annelid.cli.json_output import with_json
 from annelid.errors import AnnelidError, ConfigError, RunKilled, SimulationStopped, shown, suggest
 from annelid.text import write_printable_only
 

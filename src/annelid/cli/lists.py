@@ -11,7 +11,7 @@ import typer
 
 from annelid.cli.common import FIRST_PRESET
 from annelid.cli.entry import complain, listing
-from annelid.cli.result import give, refuse_json
+from annelid.cli.json_output import give, refuse_json
 from annelid.errors import ConfigError, listed
 
 if TYPE_CHECKING:
@@ -139,7 +139,7 @@ def runs_command(
     annelid list runs sweep --json
     annelid list runs --clean runs/riddle2023-001 --yes
     """
-    from annelid.experiment.kept import remove, runs_below
+    from annelid.experiment.run_list import remove, runs_below
 
     refuse_json(bool(clean), "--clean")
     found = list(runs_below(folder)) if folder != Path("runs") or folder.is_dir() else []

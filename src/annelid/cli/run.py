@@ -26,7 +26,7 @@ from annelid.cli.common import (
     print_run,
 )
 from annelid.cli.entry import EXIT_INTERRUPTED, command, complain, end_study, lock
-from annelid.cli.result import wants_json
+from annelid.cli.json_output import wants_json
 from annelid.errors import ConfigError, SimulationStopped
 
 

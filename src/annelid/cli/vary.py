@@ -20,7 +20,7 @@ from annelid.cli.common import (
     print_results,
 )
 from annelid.cli.entry import EXIT_ALL_FAILED, command, complain, end_study, typed_command
-from annelid.cli.result import refuse_json
+from annelid.cli.json_output import refuse_json
 
 
 @command("sweep", "Vary")

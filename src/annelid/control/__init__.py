@@ -8,11 +8,12 @@ from annelid.control.base import (
     Slope,
     WrappedController,
 )
-from annelid.control.circuit import SENSED, Circuit, Pulse, Readout, Sense, Source, Switch, lengthening_m
+from annelid.control.circuit import Circuit, Readout
 from annelid.control.circuit_controller import CircuitController, CircuitKind
 from annelid.control.network import NetworkController
 from annelid.control.open_loop import ProgramController, SineController, TimedController
 from annelid.control.own import own_controller
+from annelid.control.senses import SENSED, Pulse, Sense, Source, Switch, lengthening_m
 from annelid.control.sns import DRIVE_HINT, paper_controller
 from annelid.control.turning import TurningController
 from annelid.lazy import lazy

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from annelid.config.run import ControllerKind, RunConfig
 from annelid.control.base import SegmentController
-from annelid.control.circuit import SENSED, Circuit, InputTable, lengthening_m
+from annelid.control.circuit import Circuit, InputTable
+from annelid.control.senses import SENSED, lengthening_m
 from annelid.errors import ConfigError
 from annelid.nervous import GapJunction, Network, NetworkState, Stepper
 from annelid.protocols import Array, Plant, Sensation, State, Values

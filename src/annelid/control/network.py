@@ -7,8 +7,9 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from annelid.control.circuit import Circuit, Readout, Source
+from annelid.control.circuit import Circuit, Readout
 from annelid.control.circuit_controller import CircuitController
+from annelid.control.senses import Source
 from annelid.errors import ConfigError, require_positive
 from annelid.nervous import NO_GATE, GapJunction, Network, Scheme
 from annelid.protocols import Array, Sensation, Values

@@ -7,8 +7,9 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from annelid.config.run import RunConfig
-from annelid.control.circuit import Circuit, Sense, Source
+from annelid.control.circuit import Circuit
 from annelid.control.circuit_controller import CircuitKind
+from annelid.control.senses import Sense, Source
 from annelid.control.sns import Sns
 from annelid.nervous import peristalsis
 

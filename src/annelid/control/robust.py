@@ -10,8 +10,9 @@ from annelid.config.kinds import Knob
 from annelid.config.run import RunConfig
 from annelid.config.sections import Positive, Section, Share
 from annelid.control.base import TimeConstant
-from annelid.control.circuit import Circuit, Readout, Sense, Source
+from annelid.control.circuit import Circuit, Readout
 from annelid.control.circuit_controller import CircuitKind
+from annelid.control.senses import Sense, Source
 from annelid.control.sns import DRIVE_HINT
 from annelid.errors import ConfigError
 from annelid.nervous import robust

@@ -10,8 +10,9 @@ from pydantic import Field
 
 from annelid.config.run import ControllerKind, RunConfig
 from annelid.config.sections import NonNegative, Positive
-from annelid.control.circuit import Circuit, Pulse, Readout, Source, Switch
+from annelid.control.circuit import Circuit, Readout
 from annelid.control.circuit_controller import CircuitKind
+from annelid.control.senses import Pulse, Source, Switch
 from annelid.nervous import Network, PeristalsisParameters, peristalsis
 
 DRIVE_HINT = "Descending drive: more of it makes the wave faster."

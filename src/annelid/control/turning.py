@@ -19,7 +19,7 @@ from annelid.config.answers import Goals
 from annelid.config.run import RunConfig, TurningKind
 from annelid.config.sections import Level, NonNegative, Positive
 from annelid.control.base import SavedWrapper, TimeConstant
-from annelid.control.circuit import heading_angle
+from annelid.control.senses import heading_angle
 from annelid.errors import ConfigError
 from annelid.protocols import (
     SIDES,

@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 from annelid.arena.geoms import GROUND_RGBA, PLAIN_RGBA, add_looks
 from annelid.body import build_spec, worm_of
 from annelid.body.actuation import crossing_site, ring_names
+from annelid.body.constraint_rows import tied_bodies
 from annelid.body.formulations.rods.net import STRAND_RGBA
-from annelid.body.rows import tied_bodies
 from annelid.config import RunConfig
 from annelid.draw.camera import FIELD_OF_VIEW_DEG
 from annelid.draw.canvas import activation_color
 from annelid.draw.overlay import BRIGHT, DIM, Background, Entry, background_of
 from annelid.protocols import Array
-from annelid.simulation.objects import in_scene
+from annelid.simulation.scene_objects import in_scene
 
 HEADLIGHT = 0.25  # light from the camera; the lamp adds 0.4
 CONTRACTED_WIDTH = 1.8  # a contracted ring muscle is drawn this much thicker than a relaxed one

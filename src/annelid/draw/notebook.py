@@ -14,7 +14,7 @@ from annelid.draw.figures import RUN_FIGURES
 from annelid.draw.gallery import VIDEO_TASK, frame_time_s, task_bar
 from annelid.draw.plots import figure7, plot_path
 from annelid.draw.render import render_frame, render_video
-from annelid.draw.table import COMPARED, closing_sentence, legend, summary_rows
+from annelid.draw.summary_table import COMPARED, closing_sentence, legend, summary_rows
 from annelid.errors import AnnelidError
 from annelid.simulation.runfile import VIEWS, Run, open_run
 from annelid.text import printable

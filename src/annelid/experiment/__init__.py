@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from annelid.experiment.check import Check, check, compare, refinements
     from annelid.experiment.executors import Processes, answers, end_after
     from annelid.experiment.fingerprint import code_fingerprint, physics_fingerprint, room_of
-    from annelid.experiment.judge import Judged, judge, numerical_problem
+    from annelid.experiment.gait_criteria import Judged, judge, numerical_problem
     from annelid.experiment.outcome import Hold, Outcome
     from annelid.experiment.progress import StudyProgress, study_progress
     from annelid.experiment.store import Store, case_key

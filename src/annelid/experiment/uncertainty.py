@@ -20,7 +20,7 @@ from annelid.analysis import NUMBERS
 from annelid.analysis.numbers import UNKNOWN, Number
 from annelid.config import RunConfig
 from annelid.draw.figures.experiments import uncertainty_figure
-from annelid.draw.table import framed_table
+from annelid.draw.summary_table import framed_table
 from annelid.errors import ConfigError
 from annelid.experiment.outcome import Outcome
 from annelid.experiment.progress import StudyProgress

@@ -12,7 +12,7 @@ from annelid.draw.figures.track import track_figure
 from annelid.draw.page import html_page
 from annelid.draw.plots import figure7
 from annelid.draw.render import Progress, render_frame
-from annelid.draw.table import COMPARED, closing_sentence, legend, summary_rows
+from annelid.draw.summary_table import COMPARED, closing_sentence, legend, summary_rows
 from annelid.errors import AnnelidError
 from annelid.markdown import anchors, code, emphasis, table, words
 from annelid.output import whole_file

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TypeVar
 
-from annelid.arena.geoms import set_friction
+from annelid.arena.friction import set_friction
 from annelid.body.worm import worm_of
 from annelid.config import RunConfig
 from annelid.errors import ConfigError

@@ -17,7 +17,7 @@ from annelid.body.worm import WormBody
 from annelid.config import ArenaKind
 from annelid.morphology import Array, MeshGeometry, heading_turn, norm
 from annelid.simulation.energies import Elasticity, EnergyMeter
-from annelid.simulation.objects import Objects, add_scene_sensors, in_scene
+from annelid.simulation.scene_objects import Objects, add_scene_sensors, in_scene
 from annelid.simulation.skin import Skin
 
 _NET_FORCE = 3

@@ -16,7 +16,8 @@ from annelid.protocols import Controller, Plant, Records, Sensation, Stoppable, 
 from annelid.simulation.lock import locks
 from annelid.simulation.progress import Interruption, ProgressCallback, reporting
 from annelid.simulation.recorder import Recorder, Senses, global_attributes, loop_signals
-from annelid.simulation.runfile import FILE_NAME, Origin, Run, continued_config, open_run, origin_of, refuse_used_folder
+from annelid.simulation.resume import Origin, continued_config, origin_of
+from annelid.simulation.runfile import FILE_NAME, Run, open_run, refuse_used_folder
 from annelid.simulation.stepping import Simulation, as_controller, build_plant, start
 
 PROGRESS_INTERVAL_S = 0.2

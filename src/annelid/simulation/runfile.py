@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic import ValidationError
 
-from annelid.config import CONSTANT, REPLACED, RunConfig, field_value, fields_of, has_field
+from annelid.config import CONSTANT, REPLACED, RunConfig, has_field
 from annelid.errors import ConfigError, RunFileError, UnreadableText
 from annelid.registry import Registry
 from annelid.simulation import digest
@@ -111,7 +111,7 @@ def open_run(path: str | Path) -> Run:
     Raises:
         RunFileError: There is no such file, it is no annelid run, or it is truncated or damaged.
     """
-    file = _examined_file(path)[0]
+    file = examined_file(path)[0]
     with _dataset(file) as dataset:
         marks = dataset[[*_BOOKKEEPING, WARNINGS, CPU_TIME]].load()
         n_samples = _count(marks, "samples_written", dataset.sizes["time"])
@@ -216,7 +216,7 @@ def _dataset(file: Path) -> Iterator[xarray.Dataset]:
 
 def read_config(path: str | Path) -> RunConfig:
     """Reads the configuration of a run, from its folder or its file; raises as `open_run`."""
-    file = _examined_file(path)[0]
+    file = examined_file(path)[0]
     with _dataset(file) as dataset:
         return _config(file, dataset.attrs)
 
@@ -225,7 +225,7 @@ def read_checkpoint(path: str | Path) -> Checkpoint:
     """Reads the last checkpoint of a run; raises as `open_run`, or where the run has no checkpoint."""
     import h5py
 
-    file = _examined_file(path)[0]
+    file = examined_file(path)[0]
     with _reading(file):
         with h5py.File(file, "r") as content:
             slots = [content[name][()].tobytes() for name in SLOTS if name in content]  # type: ignore[index]
@@ -241,7 +241,7 @@ def verify_run(path: str | Path) -> str:
 
     Returns a sentence: that it is intact, or that and why it carries no digest. Raises as `open_run`.
     """
-    file, state = _examined_file(path, whole=True)
+    file, state = examined_file(path, whole=True)
     if state == "intact":
         return f"{file} is intact: every byte is as it was when the run ended"
     reason = "an older version of annelid wrote it"
@@ -261,7 +261,7 @@ def refuse_used_folder(out: Path, overwrite: bool) -> None:
         raise RunFileError(f"cannot use the output folder {out}: {error.strerror}") from None
 
 
-def _examined_file(path: str | Path, *, whole: bool = False) -> tuple[Path, digest.State]:
+def examined_file(path: str | Path, *, whole: bool = False) -> tuple[Path, digest.State]:
     """Returns the run file behind a path and what its digest says, once it is clear that it is safe to read.
 
     The whole of a large file is compared with its digest only if asked for.
@@ -327,61 +327,3 @@ def _config(file: Path, attrs: dict[Any, Any]) -> RunConfig:
             f"{file} was written by annelid {attrs['annelid_version']}, whose configuration this version "
             "does not understand"
         ) from None
-
-
-_FREE = frozenset({"duration_s", "record", "name", "summary", "published"})
-"""Fields in which a continued run may differ from the one before it."""
-
-
-@dataclass(frozen=True, slots=True)
-class Origin:
-    """The run that is continued: its file, its configuration, and its last checkpoint."""
-
-    path: Path
-    config: RunConfig
-    checkpoint: Checkpoint
-
-    @property
-    def time_s(self) -> float:
-        """Simulated time of the checkpoint, s."""
-        return self.checkpoint.step * self.config.clock.control_timestep_s
-
-    def attrs(self) -> dict[str, Any]:
-        """Returns the global attributes that name it in the file of the run that goes on."""
-        return {"resumed_from": f"{self.path.resolve().parent.name}/{self.path.name}", "resumed_at_s": self.time_s}
-
-
-def origin_of(run: Run | str | Path) -> Origin:
-    """Reads what is needed to continue a run; raises as `read_checkpoint`."""
-    path = _examined_file(run.path if isinstance(run, Run) else run)[0]
-    return Origin(path, read_config(path), read_checkpoint(path))
-
-
-def continued_config(config: RunConfig | None, origin: Origin, out: Path) -> RunConfig:
-    """Checks that a configuration continues a run, and returns it (that run's own if there is none).
-
-    ``duration_s`` counts from time zero of the first run, so it must lie beyond the checkpoint.
-
-    Raises:
-        ConfigError: It differs in more than the duration, the recording and the name, ends before the
-            checkpoint, or ``out`` is the folder of the run that is continued.
-    """
-    if out.resolve() == origin.path.resolve().parent:
-        raise ConfigError(f"the output folder {out} holds the run to continue: name another")
-    config = config or origin.config
-    ours, theirs = (
-        {path: field_value(each, path) for path in fields_of(each) if path.partition(".")[0] not in _FREE}
-        for each in (config, origin.config)
-    )
-    changed = sorted(path for path in ours.keys() | theirs.keys() if ours.get(path) != theirs.get(path))
-    if changed:
-        raise ConfigError(
-            f"a continued run may differ in duration_s, record and name only, but {', '.join(changed)} "
-            f"differs from {origin.path}"
-        )
-    if round(config.duration_s / config.clock.control_timestep_s) <= origin.checkpoint.step:
-        raise ConfigError(
-            f"duration_s = {config.duration_s:g} does not go beyond the {origin.time_s:g} s that {origin.path} "
-            "holds already; it counts from time zero of the first run"
-        )
-    return config

@@ -27,7 +27,7 @@ from annelid.protocols import (
 )
 from annelid.simulation.checkpoint import Checkpoint, generator_state, restore_generator
 from annelid.simulation.recorder import Schedule
-from annelid.simulation.runfile import Origin
+from annelid.simulation.resume import Origin
 
 _ACTIVATION_SLACK = 1e-9
 _OPTIONAL_FIELDS = ("ring_length_m", "muscle_force_N", "contact_force_N", "center_of_mass_m")

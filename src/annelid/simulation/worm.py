@@ -12,8 +12,8 @@ import numpy as np
 from annelid.arena.ground import surface_of
 from annelid.arena.surface import Plane
 from annelid.body import build_spec, compile_spec
+from annelid.body.constraint_rows import tendons_to_rows
 from annelid.body.mechanics import NO_GAP
-from annelid.body.rows import tendons_to_rows
 from annelid.body.worm import WormBody, worm_of
 from annelid.clock import SLACK_S, StepRatio
 from annelid.config import ArenaKind, RunConfig
@@ -25,7 +25,7 @@ from annelid.protocols import SIDES, Recordable, Sensation, Signal, State, Value
 from annelid.simulation.anatomy import Anatomy, Posture, add_contact_sensors, start_placement
 from annelid.simulation.energies import EnergyTotals, Powers, work_in_step
 from annelid.simulation.ground import MovingGround
-from annelid.simulation.objects import NO_ENCOUNTER
+from annelid.simulation.scene_objects import NO_ENCOUNTER
 from annelid.simulation.skin import Touch
 from annelid.simulation.watch import Energies, Watch
 

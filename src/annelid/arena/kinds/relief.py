@@ -125,7 +125,8 @@ class Rough(Relief):
         """Adds a height field."""
         import mujoco
 
-        from annelid.arena.geoms import HIDDEN_GROUP, contact_options
+        from annelid.arena.friction import contact_options
+        from annelid.arena.geoms import HIDDEN_GROUP
 
         half_length, middle = (AHEAD_M + BEHIND_M) / 2, (BEHIND_M - AHEAD_M) / 2
         columns, rows = (int(2 * half / FIELD_GRAIN_M) + 1 for half in (half_length, HALF_WIDTH_M))

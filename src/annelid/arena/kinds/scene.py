@@ -75,7 +75,8 @@ class Scene(ArenaKind):
 
     def add_own(self, spec: mujoco.MjSpec) -> None:
         """Adds ground and things, which have the arena's contact parameters unless they state their own."""
-        from annelid.arena.geoms import add_scene, contact_options
+        from annelid.arena.friction import contact_options
+        from annelid.arena.geoms import add_scene
 
         options = contact_options(self)
         contact = {name: " ".join(map(repr, options[name])) for name in ("friction", "solref", "solimp")}

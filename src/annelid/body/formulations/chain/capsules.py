@@ -14,13 +14,13 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from annelid.arena.geoms import skin_options
+from annelid.arena.friction import skin_options
 from annelid.body.actuation import crossing_site, mark_crossing
+from annelid.body.constraint_rows import add_row
 from annelid.body.formulations import densities_kg_per_m, stiffness_shares
 from annelid.body.formulations.rods.net import AXES, STRAND_RGBA, add_touch
 from annelid.body.mechanics import Mechanics
 from annelid.body.mesh import MeshBody, Strands
-from annelid.body.rows import add_row
 from annelid.config import ArenaKind
 from annelid.morphology import Array, MeshGeometry, norm
 

@@ -7,13 +7,13 @@ from collections.abc import Callable, Iterator
 import mujoco
 import numpy as np
 
+from annelid.body.constraint_rows import Ties
 from annelid.body.formulations import Tie
 from annelid.body.formulations.rods.net import vertex_name
 from annelid.body.formulations.rods.strains import RodStrains, RodVertices, net_stiffness
 from annelid.body.formulations.rods.two_step import TwoStep
 from annelid.body.mechanics import Mechanics
 from annelid.body.mesh import MeshBody
-from annelid.body.rows import Ties
 from annelid.morphology import Array, MeshGeometry, norm
 from annelid.protocols import State
 

@@ -6,7 +6,7 @@ bending and torsion, kept inextensible by edge constraints. A rod's twist needs 
 name; without the hinges the model compiles and is far too floppy.
 
 A plant has rows for bending and twist in place of the engine's (`annelid.body.formulations.rods.strains`). Separate
-pins are point masses tied to a vertex of each strand by springs and dashpots (`annelid.body.rows`).
+pins are point masses tied to a vertex of each strand by springs and dashpots (`annelid.body.constraint_rows`).
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from annelid.arena.geoms import skin_options
+from annelid.arena.friction import skin_options
 from annelid.body.actuation import crossing_site, mark_crossing
+from annelid.body.constraint_rows import add_held_coordinate, add_holder, add_tie
 from annelid.body.formulations import Tie, densities_kg_per_m
 from annelid.body.formulations.rods.strains import add_strains, net_stiffness, twist_name
 from annelid.body.mesh import MeshBody, Strands
-from annelid.body.rows import add_held_coordinate, add_holder, add_tie
 from annelid.config import ArenaKind
 from annelid.morphology import Array, MeshGeometry
 

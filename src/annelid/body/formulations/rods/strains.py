@@ -15,9 +15,9 @@ its length and that of its hinge w, the rates of bending, of bending sideways an
     b . (n1 - n0) - tan(h) (w0 + w1)
     w1 - w0 + tan(h) b . (n0 + n1)
 
-They are zero in every rigid rotation. Each is a row of `annelid.body.rows`: the engine solves bending, twist and
-what they do to one another at the end of a step, with the coefficients of one posture. The engine's own rods have no
-matrix elements between vertices and hinges, so that their steps are of first order, and damp in the plane of a bend
+They are zero in every rigid rotation. Each is a row of `annelid.body.constraint_rows`: the engine solves bending, twist
+and what they do to one another at the end of a step, with the coefficients of one posture. The engine's own rods have
+no matrix elements between vertices and hinges, so that their steps are of first order, and damp in the plane of a bend
 only.
 """
 
@@ -29,9 +29,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from annelid.body.constraint_rows import complete_rows, row_name, row_tendon
 from annelid.body.formulations import stiffness_shares
 from annelid.body.mesh import Strands
-from annelid.body.rows import complete_rows, row_name, row_tendon
 from annelid.morphology import Array, MeshGeometry, cross
 
 MODES = ("bend", "side", "twist")

@@ -25,7 +25,7 @@ from annelid.cli.common import (
     worms_from,
 )
 from annelid.cli.entry import command, lock
-from annelid.cli.result import give, refuse_json
+from annelid.cli.json_output import give, refuse_json
 from annelid.errors import ConfigError, RunFileError, suggest
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ import typer
 
 from annelid.cli.common import ArenaName, Assignments, FidelityLevel, Preset, Segments, config_of, overrides_of
 from annelid.cli.entry import EXIT_USAGE, command
-from annelid.cli.result import give, refuse_json
+from annelid.cli.json_output import give, refuse_json
 
 
 @command("check", "Make")

@@ -16,7 +16,6 @@ import numpy as np
 
 from annelid import load_config, simulate
 from annelid.draw.canvas import canvas, save
-from annelid_studies.planar.huang import segment_length
 
 PROGRAM = {"kind": "program", "contractions": [{"segment": 2, "start_s": 0.0, "stop_s": 0.8}]}
 WORMS = {
@@ -24,6 +23,12 @@ WORMS = {
     "riddle2023-fast": ("rods with soft crossings", "0.45", ":"),
 }
 REST_RING_M, REST_SEGMENT_M, N_PER_PLANE = 0.960, 0.0748, 6
+
+
+def segment_length(ring_m: np.ndarray, side_m: float, n_per_plane: int) -> np.ndarray:
+    """Length of a segment of the rigid tube, m, in closed form: with the width w of a rhombus, l^2 + w^2 = 4 s^2."""
+    width_m = ring_m / (n_per_plane * np.cos(np.pi / (2 * n_per_plane)))
+    return np.sqrt((2.0 * side_m) ** 2 - width_m**2)
 
 
 def main(picture: Path) -> None:

@@ -17,8 +17,15 @@ from annelid_studies.turning import COUNTER, turn_of
 
 LEFT = {"turning": {"kind": "constant", "modulation": 0.8, "descending_time_constant_s": 0.05}}
 RIGHT_POST = {"arena.posts": [[0.1, 0.185, 0.03]]}
-TOUCH = {"turning": {"kind": "touch", "arm_N": 0.5, "least_N": 0.1, "full_N": 2.0}} | RIGHT_POST
+TOUCH = {"turning": {"kind": "touch"}} | RIGHT_POST
 HEADING = {"turning": {"kind": "heading", "heading_deg": 40.0}}
+
+
+@pytest.fixture
+def light_touch(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Forces of the rule for a robot that weighs little."""
+    for name, force_N in {"TOUCH_STARTS_N": 0.5, "TOUCH_LEAST_N": 0.1, "TOUCH_FULL_N": 2.0}.items():
+        monkeypatch.setattr(f"annelid.control.turning.{name}", force_N)
 
 
 def test_no_modulation_is_the_plain_run_bit_for_bit(tmp_path: Path) -> None:
@@ -30,6 +37,7 @@ def test_no_modulation_is_the_plain_run_bit_for_bit(tmp_path: Path) -> None:
     assert np.all(turning.data["half_scale"] == 1.0)
 
 
+@pytest.mark.usefixtures("light_touch")
 @pytest.mark.parametrize(
     "turning",
     [
@@ -96,6 +104,7 @@ def test_the_touch_of_the_floor_alone_turns_nobody(tmp_path: Path) -> None:
     assert np.all(run.data["half_scale"] == 1.0)
 
 
+@pytest.mark.usefixtures("light_touch")
 def test_a_post_on_the_right_is_felt_there_and_turns_the_worm_away_from_it(tmp_path: Path) -> None:
     run = simulate(small_config(**TOUCH), tmp_path / "run", progress=False)
     front = run.data["touch"].values[:, 0]

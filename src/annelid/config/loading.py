@@ -17,7 +17,7 @@ from annelid.config.kinds import kind_of_file
 from annelid.config.run import SHARED, ArenaKind, BodyKind, RunConfig
 from annelid.errors import ConfigError, UnreadableText, listed, shown, suggest
 from annelid.registry import load_extensions
-from annelid.textfiles import check_depth, parse_toml, read_toml, toml_value
+from annelid.textfiles import MOST_LEVELS, check_depth, parse_toml, read_toml, toml_value
 
 DEFAULT_BASE = "riddle2023-rods"
 """What a user's file starts from unless it says otherwise or states its own kind of body."""
@@ -235,6 +235,10 @@ def _layers(
         own.setdefault("name", path.stem)
         if path.resolve() in above:
             raise ConfigError(f"{path} extends itself: {listed(each.name for each in (*above, path))}")
+        if len(above) >= MOST_LEVELS:
+            raise ConfigError(
+                f"{path} is extended through {len(above)} files: at most {MOST_LEVELS} may extend another"
+            )
         above = (*above, path.resolve())
         body = own.get("body")
         stands_alone = isinstance(body, Mapping) and "kind" in body

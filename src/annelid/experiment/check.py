@@ -118,7 +118,7 @@ class Check:
         return percent(self.largest(name)) + ("\nnot resolved" if self.largest(name) > RESOLVED else "")
 
     def _named(self, name: str) -> str:
-        return f"{NUMBERS[name].label} {percent(self.largest(name))}"
+        return f"{NUMBERS[name].label} ({percent(self.largest(name))})"
 
     @property
     def brief(self) -> str:

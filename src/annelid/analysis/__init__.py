@@ -74,4 +74,5 @@ __all__ = [
 ]
 
 _MOVED = tuple(f"annelid_studies.{home}" for home in ("slip_detector", "slip", "turning", "riddle2023.figures.rhombi"))
-__getattr__, __dir__ = lazy(__name__, now=_MOVED)
+_COST = "use annelid_studies.slip.speed_and_loss"
+__getattr__, __dir__ = lazy(__name__, {"slip_cost": _COST, "SlipCost": _COST}, now=_MOVED)

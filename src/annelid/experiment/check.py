@@ -123,7 +123,9 @@ class Check:
     @property
     def brief(self) -> str:
         """Says in a few words what keeps the run from being resolved: another order, or the number that moves most."""
-        return self.differences[0] if self.differences else "" if self.worst is None else self._named(self.worst)
+        if self.differences or self.worst is None:
+            return self.differences[0] if self.differences else ""
+        return f"{NUMBERS[self.worst].label} {percent(self.largest(self.worst))}"
 
     @property
     def sentence(self) -> str:

@@ -337,12 +337,12 @@ class WormPlant:
         for field, words, value, limit, unit in (
             ("guard.height_m", self._height_words, height, guard.height_m, " m"),
             ("guard.edge_strain", "edge strain of a rod", strain, guard.edge_strain, ""),
-            ("", "gap between two strands that a pin joins", gap, MOST_GAP_M, " m"),
+            ("of the gap", "gap between the pinned strands of a crossing", gap, MOST_GAP_M, " m"),
             ("guard.kinetic_energy_J", "kinetic energy", energy, guard.kinetic_energy_J, " J"),
         ):
             # Written so that NaN fails it.
             if not value <= limit:
-                return f"{words} is {value:.3g}{unit}, above the limit {field and f'{field} = '}{limit:g}{unit}"
+                return f"{words} is {value:.3g}{unit}, above the limit {field} = {limit:g}"
         rings, springs = posture.ring_length, posture.spring_length
         return self._watch.look(self._time_s, rings, springs, self._depth_m(), gap, self._activation, self._tension_N)
 

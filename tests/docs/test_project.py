@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import ast
 import re
+import sys
 import tomllib
+from importlib.metadata import packages_distributions
 from typing import Any
 
 import yaml
@@ -27,6 +30,8 @@ CONDA = {
     "matplotlib": {"matplotlib-base"},
 }
 """Names on conda-forge, where they are others or more."""
+PARTS = {"imageio-ffmpeg", "pydantic-core", "hdmf", "trimesh", "websockets"}
+"""What a stated package is made of: imageio, pydantic, pynwb and viser bring them, and their versions go together."""
 
 
 def lowest(requirement: Requirement) -> Version:
@@ -46,6 +51,18 @@ def test_lowest_versions_are_those_that_were_tried() -> None:
     stated = RUNTIME + [Requirement(line) for extra in extras.keys() - NOT_TRIED for line in extras[extra]]
     bounds = {canonicalize_name(each.name): lowest(each) for each in stated if each.name != "annelid"}
     assert {name: tried.get(name) for name in bounds} == bounds
+
+
+def test_every_package_that_is_imported_is_stated() -> None:
+    nodes = [node for path in (ROOT / "src").rglob("*.py") for node in ast.walk(ast.parse(path.read_bytes()))]
+    names = {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
+    names |= {node.module or "" for node in nodes if isinstance(node, ast.ImportFrom)}
+    imported = {name.split(".")[0] for name in names} - sys.stdlib_module_names
+    homes = packages_distributions()
+    needed = {canonicalize_name(home) for name in imported for home in homes.get(name, ())} - PARTS - {"annelid"}
+    extras = PROJECT["project"]["optional-dependencies"]
+    stated = RUNTIME + [Requirement(line) for lines in extras.values() for line in lines]
+    assert needed - {canonicalize_name(each.name) for each in stated} == set()
 
 
 def test_the_recipe_has_the_packages_dependencies() -> None:

@@ -61,7 +61,7 @@ WORDS = {
     "ring": "has collapsed",
     "segment": "in the mesh at rest",
     "depth": "deep in the ground",
-    "force": "pulled nothing",
+    "force": "pulled with no force",
     "flight": "-",
 }
 """What a warning must say of each kind of nonsense."""

@@ -67,7 +67,7 @@ class Looked:
     [
         (
             {"ring_length_m": np.array([0.96, 0.023, 0.96])},
-            "ring 2 is 0.023 m long, below the limit",
+            "the ring of segment 2 is 0.023 m long, below the limit",
         ),
         (
             {"spring_length_m": np.append(np.full(41, 0.0748), 0.25)},
@@ -89,7 +89,10 @@ def test_a_limit_is_the_users() -> None:
 @pytest.mark.parametrize(
     ("shown", "words"),
     [
-        ({"ring_length_m": np.array([0.96, 0.96, 0.15])}, "ring 3 was 0.15 m long at 0.2 s, 16 % of its length"),
+        (
+            {"ring_length_m": np.array([0.96, 0.96, 0.15])},
+            "the ring of segment 3 was 0.15 m long at 0.2 s, 16 % of its length",
+        ),
         ({"depth_m": 0.02}, "0.02 m deep in the ground at 0.2 s"),
         ({"gap_m": 0.06}, "strands of a crossing were 0.06 m apart at 0.2 s"),
     ],
@@ -114,7 +117,7 @@ def test_an_actuator_without_force_is_told_of_every_contraction() -> None:
         look.at(0.01 * step, activation=on if contracted else 0.0 * on, force_N=pulling)
     (warning,) = look.warnings()
     assert warning.startswith(
-        "the actuators of segment 2 pulled nothing in 2 of their contractions, first from 0.2 s on"
+        "the actuators of segment 2 pulled with no force in 2 of their contractions, first at 0.2 s:"
     )
     assert look.warnings() == (warning,), "telling changes nothing"
 
@@ -123,7 +126,7 @@ def test_a_contraction_that_goes_on_counts_too() -> None:
     look = Looked()
     for step in range(50):
         look.at(0.01 * step, activation=np.array([0.0, 0.0, 1.0]))
-    assert "segment 3 pulled nothing in 1 of" in look.warnings(0.5)[0]
+    assert "segment 3 pulled with no force in 1 of" in look.warnings(0.5)[0]
     pulled = {"force_N": np.array([0.0, 0.0, 2.0]), "ring_length_m": np.array([0.96, 0.96, 0.9])}
     look.at(0.51, activation=np.array([0.0, 0.0, 1.0]), **pulled)
     assert look.warnings(0.52) == ()
@@ -183,7 +186,7 @@ def test_a_ring_that_collapses_stops_the_run(preset: str, changes: dict[str, Any
         simulate(load_config(preset, changes), tmp_path, progress=False)
     run = open_run(tmp_path)
     assert run.status == "stopped_by_guard"
-    assert any(warning.startswith("ring 1 was 0.0") for warning in run.warnings)
+    assert any(warning.startswith("the ring of segment 1 was 0.0") for warning in run.warnings)
 
 
 def test_a_setup_that_can_mean_nothing_is_refused_before_anything_is_written(tmp_path: Path) -> None:
@@ -225,7 +228,7 @@ def test_a_body_that_stretches_manyfold_is_told() -> None:
 
 def test_a_cable_that_stays_slack_is_told(tmp_path: Path) -> None:
     run = simulate(load_config("wang", SLACK), tmp_path, progress=False)
-    assert any(warning.startswith("the actuators of segment 1 pulled nothing") for warning in run.warnings)
+    assert any(warning.startswith("the actuators of segment 1 pulled with no force") for warning in run.warnings)
 
 
 @pytest.mark.slow

@@ -113,7 +113,7 @@ def test_the_soft_pins_part_and_the_guard_watches_them(monkeypatch: pytest.Monke
     advance(plant, np.ones(3), 0.2)
     alarm = plant.alarm()
     assert alarm is not None
-    assert "gap at a pin" in alarm
+    assert "gap between the pinned strands" in alarm
 
 
 def test_half_rings_on_one_side_bend_the_worm() -> None:

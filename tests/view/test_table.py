@@ -46,6 +46,14 @@ def test_no_number_is_minus_zero(rods_run: Run) -> None:
     assert "-2.0 mm" in text
 
 
+def test_a_short_run_does_not_contradict_itself() -> None:
+    """A wave that was seen to its end stands beside no row that says there were no cycles."""
+    for cycles, shown in ((0, False), (3, True)):
+        rows = {row.label: row.ours for row in summary_rows(replace(formulation(), cycles=cycles), RODS)}
+        assert rows["wave 1-2-..-N"] == "yes, 2 times"
+        assert ("complete cycles after the first" in rows) == shown
+
+
 def cells(numbers: Summary, preset: str, label: str) -> tuple[str, ...]:
     return next(row for row in summary_rows(numbers, load_config(preset)) if row[0].startswith(label))[1:]
 

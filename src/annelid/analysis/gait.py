@@ -25,7 +25,9 @@ class Gait:
 
     start_s: float | None = number("beginning of the first complete cycle that counts")
     end_s: float | None = number("end of the last one")
-    cycles: int = number("number of complete cycles between them", "complete cycles", digits=0, default=0)
+    cycles: int = number(
+        "number of complete cycles between them", "complete cycles after the first", digits=0, default=0
+    )
     gait_period_s: float | None = number("mean duration of these cycles")
     speed_m_per_s: float | None = number(
         "travel of the centre of mass towards the front over time, negative backwards", "speed", 100.0, 2, "cm/s"

@@ -17,10 +17,10 @@ class Muscles:
     """Forces of the muscles in all samples in which they are contracted, and their work in the whole run."""
 
     contraction_force_median_N: float | None = number(
-        "median muscle force while contracted", "force contracted, median", 1.0, 2, "N"
+        "median muscle force while contracted", "force while contracted, median", 1.0, 2, "N"
     )
     contraction_force_peak_N: float | None = number(
-        "largest recorded muscle force while contracted", "force contracted, peak", 1.0, 2, "N"
+        "largest recorded muscle force while contracted", "force while contracted, peak", 1.0, 2, "N"
     )
     segment_force_median_N: list[float | None] | None = number(
         "median force of the segment's muscles while contracted",

@@ -42,7 +42,7 @@ class Travel:
         "displacement of the centre of mass, negative backwards", "travel forwards, centre of mass", 1000.0, 1, "mm"
     )
     travel_path_m: float | None = number(
-        "length of its path forwards and backwards", "travel, forth and back", 1000.0, 1, "mm"
+        "length of its path forwards and backwards", "travel, forwards and backwards", 1000.0, 1, "mm"
     )
 
 

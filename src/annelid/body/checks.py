@@ -110,26 +110,26 @@ def tolerance_findings(config: RunConfig, body: MeshBody, window: tuple[float, f
     low, high = window or (0.02 * most, 0.25 * most)
     instead = f"set about {(low + high) / 2 if window else 0.12 * most:.2g}"
     if tolerance >= most:
-        problem = (
-            f"a segment lengthens by at most {most:.2g} m before its strands are straight: its sensor never goes off"
-        )
+        problem = f"a segment lengthens by at most {most:.2g} m, to straight strands: its sensor never switches off"
     elif window and low >= high:
         problem = (
-            f"contracting neighbours lift a segment by about {low:.2g} m, and one that lets go is within {high:.2g} m "
-            "before the next is beyond it, so that no tolerance is known to keep the order"
+            f"contracting neighbours lengthen a segment by about {low:.2g} m, which must switch nothing, and a "
+            f"tolerance above {high:.2g} m switches a relaxing segment's sensor on too early: no tolerance is "
+            "known to keep the order"
         )
         instead = "take controller.kind = sns-robust, or softer strands"
     elif tolerance > high and window:
         problem = (
-            f"a segment that lets go is within {high:.2g} m before the next is beyond it: sensors may never go off"
+            f"above {high:.2g} m a relaxing segment's sensor switches on before that of the next one is off, so that "
+            "the wave may stop"
         )
     elif tolerance > high:
         problem = (
-            f"that is over a quarter of the {most:.2g} m by which a segment can lengthen: sensors may never go off"
+            f"that is over a quarter of the {most:.2g} m by which a segment can lengthen: sensors may never switch off"
         )
     elif tolerance < low:
         lift = low if window else 0.1 * most
-        problem = f"a contracting neighbour lifts a segment by up to {lift:.2g} m: sensors may never go on"
+        problem = f"a contracting neighbour lengthens a segment by up to {lift:.2g} m: sensors may never switch on"
     else:
         return
     yield Finding("sensor.tolerance_m", tolerance, problem, instead)

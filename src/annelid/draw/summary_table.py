@@ -121,6 +121,8 @@ def _rows(numbers: Summary, config: RunConfig) -> dict[str, Row]:
     cells = {"order": ("segment at onset (s)", _onsets(numbers)), "wave": ("wave 1-2-..-N", _wave(numbers))}
     # What is no section's own, such as the speed of computing, comes last.
     for name, number in sorted(NUMBERS.items(), key=lambda one: one[1].section is Summary):
+        if name == "cycles" and not numbers.cycles:
+            continue
         if number.label and name not in _NO_ROW and (sensor or ", mean" not in number.label):
             label = number.label.replace("first helix", sensor) if sensor else number.label.replace(", first helix", "")
             cells[name] = (label, _ours(name, numbers))
@@ -152,8 +154,8 @@ def _and_more(items: Sequence[Any]) -> str:
 
 
 def _wave(numbers: Summary) -> str:
-    cycles = f"{numbers.full_cycles} full cycle{'' if numbers.full_cycles == 1 else 's'}"
-    return f"yes, {cycles}" if numbers.wave else "too short to judge" if numbers.wave is None else f"no ({cycles})"
+    times = f"{numbers.full_cycles} time{'' if numbers.full_cycles == 1 else 's'}"
+    return f"yes, {times}" if numbers.wave else "too short to judge" if numbers.wave is None else f"no ({times})"
 
 
 def _shares_of_the_work(numbers: Summary) -> str:
@@ -168,7 +170,7 @@ def _shares_of_the_work(numbers: Summary) -> str:
         "damping": numbers.energy_damping_J,
         "integrator": numbers.energy_numerical_J,
     }
-    return ", ".join(f"{name} {100 * part / work:.0f} %" for name, part in parts.items() if part is not None)
+    return ", ".join(f"{name} {100 * part / work:z.0f} %" for name, part in parts.items() if part is not None)
 
 
 def comparison_table(comparison: Comparison) -> Table:

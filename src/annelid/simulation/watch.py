@@ -112,8 +112,8 @@ class Watch:
         guard, ring_m = self._guard, float(np.minimum.reduce(rings))
         if ring_m < self._ring_least_m:
             return (
-                f"ring {int(rings.argmin()) + 1} is {ring_m:.3g} m long, below the limit of {self._ring_least_m:.3g} "
-                "m at which its crossings touch"
+                f"the ring of segment {int(rings.argmin()) + 1} is {ring_m:.3g} m long, below the limit of "
+                f"{self._ring_least_m:.3g} m at which its crossings touch"
             )
         if spring_m > MOST_STRETCH * spring_most_m:
             return (
@@ -122,7 +122,8 @@ class Watch:
             )
         if depth_m > guard.depth_m:
             return (
-                f"a vertex is {depth_m:.3g} m deep in the ground, above the limit guard.depth_m = {guard.depth_m:g} m"
+                f"a point of the mesh is {depth_m:.3g} m deep in the ground, above the limit "
+                f"guard.depth_m = {guard.depth_m:g} m"
             )
         return None
 
@@ -150,9 +151,9 @@ class Watch:
         ring_m, rest_m = -closing_m, self._rest_m["closing"][ring]
         if ring_m < COLLAPSED * rest_m:
             found.append(
-                f"ring {ring} was {ring_m:.3g} m long at {closed_s:.4g} s, "
-                f"{100 * ring_m / rest_m:.0f} % of its length at rest: the mesh has collapsed under "
-                f"body.rings.{self._force_field}, or by itself"
+                f"the ring of segment {ring} was {ring_m:.3g} m long at {closed_s:.4g} s, "
+                f"{100 * ring_m / rest_m:.0f} % of its length at rest: the mesh has collapsed; use less force "
+                f"(body.rings.{self._force_field}) or stiffer strands"
             )
         spring_rest_m = self._rest_m["spring"][spring[2]]
         if spring[0] > LONG * spring_rest_m:
@@ -162,34 +163,34 @@ class Watch:
             )
         if depth[0] > self._deep_m:
             found.append(
-                f"a vertex was {depth[0]:.3g} m deep in the ground at {depth[1]:.4g} s: the "
-                "contacts are too soft for what presses on them, see arena.contact_time_constant_s"
+                f"a point of the mesh was {depth[0]:.3g} m deep in the ground at {depth[1]:.4g} s: contacts are too "
+                "soft for the load; shorten arena.contact_time_constant_s"
             )
         if gap[0] > self._gap_m:
             found.append(
-                f"the strands of a crossing were {gap[0]:.3g} m apart at {gap[1]:.4g} s, over half "
-                "the side of a rhombus: the pins are too soft for what pulls at them"
+                f"the strands of a crossing were {gap[0]:.3g} m apart at {gap[1]:.4g} s, over half the distance to the "
+                "next crossing: the pins are too soft for the load"
             )
         longest_s, _, idle, first_idle_s = self._judged(self._active, time_s)
         if idle.any():
             segments = sorted({int(muscle) // self._per_segment + 1 for muscle in np.flatnonzero(idle)})
             found.append(
-                f"the actuators of segment{'s' * (len(segments) > 1)} {', '.join(map(str, segments))} pulled nothing "
-                f"in {idle.sum():.0f} of their contractions, first from {first_idle_s[idle > 0].min():.4g} s on: see "
-                f"body.rings.length_range_m, with rings of {self._ring_rest_m[segments[0] - 1]:.3g} m at rest"
+                f"the actuators of segment{'s' * (len(segments) > 1)} {', '.join(map(str, segments))} pulled with no "
+                f"force in {idle.sum():.0f} of their contractions, first at {first_idle_s[idle > 0].min():.4g} s: "
+                f"change body.rings.length_range_m; a ring is {self._ring_rest_m[segments[0] - 1]:.3g} m long at rest"
             )
         elif ring_m > (1.0 - LEAST_SHORTENED) * rest_m and longest_s.max() >= LONG_CONTRACTION_S:
             found.append(
                 f"no ring was shortened by more than {100 * max(0.0, 1 - ring_m / rest_m):.2g} %, although muscles "
-                f"were active for up to {longest_s.max():.2g} s: see body.rings.{self._force_field} and the mesh's "
-                "stiffness"
+                f"were active for up to {longest_s.max():.2g} s: use more force (body.rings.{self._force_field}) or a "
+                "softer mesh"
             )
         share = energies.numerical / energies.work if energies.work > LEAST_WORK_J else 0.0
         if abs(share) > NUMERICAL_SHARE:
             found.append(
                 f"the integrator {'took' if share > 0 else 'added'} {100 * abs(share):.0f} % of the work of muscles "
-                f"and weight, {energies.work:.3g} J, more than {100 * NUMERICAL_SHARE:.0f} %: motion depends on "
-                "clock.physics_timestep_s, compare with a shorter one"
+                f"and weight, {energies.work:.3g} J, more than {100 * NUMERICAL_SHARE:.0f} %: the motion "
+                "depends on clock.physics_timestep_s; repeat the run with a shorter one"
             )
         return tuple(found)
 

@@ -337,7 +337,7 @@ class WormPlant:
         for field, words, value, limit, unit in (
             ("guard.height_m", self._height_words, height, guard.height_m, " m"),
             ("guard.edge_strain", "edge strain of a rod", strain, guard.edge_strain, ""),
-            ("of pins", "gap at a pin", gap, MOST_GAP_M, " m"),
+            ("of the gap", "gap between the pinned strands of a crossing", gap, MOST_GAP_M, " m"),
             ("guard.kinetic_energy_J", "kinetic energy", energy, guard.kinetic_energy_J, " J"),
         ):
             # Written so that NaN fails it.

@@ -185,7 +185,7 @@ def _findings(body: MeshBody, rings: Rings, low: float, high: float, force_N: fl
     elif pull > MOST_OVER * bearable:
         problem = (
             f"at rest length a muscle begins to pull with {pull:.3g} N, {pull / bearable:.0f} times what the mesh "
-            "bears: its ring may shoot beyond the length at which the force ends"
+            "bears: its ring may be squeezed beyond the length at which the force ends"
         )
         most = MOST_OVER * bearable / _active_share(at_rest, rings)
         yield Finding(f"body.rings.{rings.force_field}", force_N, problem, f"set at most {most:.2g}")

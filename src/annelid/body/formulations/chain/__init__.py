@@ -47,7 +47,7 @@ class Chain(FormulationKind):
         assert isinstance(body, MeshBody)
         most = _largest_step_s(body, self)
         if step > most:
-            problem = f"the chain is integrated explicitly, which its joints and springs bear up to about {most:.2g} s"
+            problem = f"the chain's joints and springs are unstable in steps above about {most:.2g} s"
             instead = f"set at most {most / 2:.1g}, or a larger body.formulation.armature_kg_m2"
             yield Finding("clock.physics_timestep_s", step, problem, instead)
         if self.pin_time_constant_s < 2.0 * step:

@@ -66,7 +66,7 @@ class Rods(FormulationKind):
         step = config.clock.physics_timestep_s
         field, most = "clock.physics_timestep_s", 0.06
         if step > most:
-            problem = f"rods are measured up to {most:g} s, where their edges stretch by 3 %"
+            problem = f"rods were tested in steps up to {most:g} s only, in which their edges stretch by 3 %"
             yield Finding(field, step, problem, f"set at most {most:g}")
 
     def add(

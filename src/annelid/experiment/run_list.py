@@ -1,23 +1,17 @@
-"""The runs that lie below a folder: what each is, and removing the files that annelid wrote for it."""
+"""The runs that lie below a folder, and what each is."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
 from annelid.errors import AnnelidError, ConfigError, RunFileError
 from annelid.experiment.outcome import OUTCOME_NAME
-from annelid.simulation.lock import LOCK_NAME, locked
 from annelid.simulation.runfile import FILE_NAME, STATUSES, read_config
 from annelid.textfiles import parse_json
-
-PICTURES = ("figure7.png", "frame.png", "video.mp4")
-"""What `annelid run` draws into a run's folder."""
-UNREADABLE = "unreadable"
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +24,7 @@ class Kept:
     duration_s: float | None
     """Simulated time that was reached."""
     size_bytes: int
-    """Size of the files that annelid wrote there."""
+    """Size of the files in the folder."""
     changed: str
     """When the newest of them was written, UTC."""
     status: str
@@ -45,15 +39,15 @@ def runs_below(root: Path) -> Iterator[Kept]:
         # Hidden folders are attempts of studies that still go on or were killed.
         below[:] = sorted(entry for entry in below if not entry.startswith("."))
         if FILE_NAME in files or (OUTCOME_NAME in files and _is_outcome(Path(name) / OUTCOME_NAME)):
-            yield _kept(Path(name))
+            yield _kept(Path(name), files)
 
 
-def _kept(folder: Path) -> Kept:
+def _kept(folder: Path, files: list[str]) -> Kept:
     import xarray
 
     preset = duration_s = None
     status = "outcome only"
-    if (folder / FILE_NAME).exists():
+    if FILE_NAME in files:
         try:
             preset = read_config(folder).name
             # Not `open_run`, which would load all of a large file.
@@ -62,10 +56,9 @@ def _kept(folder: Path) -> Kept:
                 duration_s = float(data["time"][n_samples - 1]) if n_samples else 0.0
                 status = STATUSES[int(data["status_code"])]
         except (RunFileError, OSError, KeyError, IndexError, ValueError):
-            status = UNREADABLE
-    states = [path.lstat() for path in _own_files(folder, status)]
-    newest = max((state.st_mtime for state in states), default=folder.stat().st_mtime)
-    changed = datetime.fromtimestamp(newest, UTC).isoformat(timespec="seconds")
+            status = "unreadable"
+    states = [(folder / file).lstat() for file in files]
+    changed = datetime.fromtimestamp(max(state.st_mtime for state in states), UTC).isoformat(timespec="seconds")
     return Kept(folder, preset, duration_s, sum(state.st_size for state in states), changed, status)
 
 
@@ -76,39 +69,3 @@ def _is_outcome(path: Path) -> bool:
     except (AnnelidError, OSError, ValueError):
         return False
     return isinstance(content, dict) and {"reader", "summary", "rhythm"} <= content.keys()
-
-
-def _own_files(folder: Path, status: str) -> list[Path]:
-    """Returns the files that annelid wrote; nothing shows it for those of an unreadable run."""
-    names = () if status in (UNREADABLE, "outcome only") else (FILE_NAME, *PICTURES)
-    files = [folder / name for name in names]
-    if _is_outcome(folder / OUTCOME_NAME):
-        files.append(folder / OUTCOME_NAME)
-    return [path for path in files if path.is_file() and not path.is_symlink()]
-
-
-def remove(run: Kept) -> None:
-    """Removes the files of a run that `runs_below` listed, and its folder if nothing else is in it.
-
-    Raises:
-        RunFileError: Another process writes there, the run is unreadable, or a file cannot be removed.
-    """
-    if not run.folder.is_dir() or run.folder.is_symlink():
-        raise RunFileError(f"{run.folder} is not there any more")
-    if run.status == UNREADABLE:
-        raise RunFileError(f"{run.folder} is unreadable, so annelid may not have written it: remove it yourself")
-    try:
-        with ExitStack() as stack:
-            # A study locks its own folder, above those of its runs.
-            for above in reversed(run.folder.absolute().parents):
-                if (above / LOCK_NAME).exists():
-                    stack.enter_context(locked(above))
-            stack.enter_context(locked(run.folder))
-            for path in _own_files(run.folder, _kept(run.folder).status):
-                path.unlink()
-    except OSError as error:
-        raise RunFileError(f"cannot remove {error.filename}: {error.strerror}") from None
-    # Where anything else is in it, such as a file of the user's, the folder stays.
-    with suppress(OSError):
-        if {entry.name for entry in run.folder.iterdir()} <= {LOCK_NAME}:
-            run.folder.rmdir()

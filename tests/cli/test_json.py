@@ -250,7 +250,7 @@ def test_an_error_is_one_sentence_on_stderr_and_no_document(annelid: Command, wo
 
 @pytest.mark.parametrize(
     "words",
-    ["show RUN --verify", "runs --clean RUN", "presets wang", "arenas floor", "doctor --report", "sweep --example"],
+    ["show RUN --verify", "presets wang", "arenas floor", "doctor --report", "sweep --example"],
 )
 def test_json_is_refused_beside_what_prints_something_else(annelid: Command, words: str) -> None:
     done = annelid(*words.split(), "--json")

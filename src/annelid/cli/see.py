@@ -214,7 +214,7 @@ def export_command(
             autocompletion=worms_from,
         ),
     ],
-    to: Annotated[str, typer.Option(metavar="FORMAT", help="csv, mat, parquet, nwb, mp4, gif, html or mjcf.")],
+    to: Annotated[str, typer.Option(metavar="FORMAT", help="csv, mat, parquet, nwb, html or mjcf.")],
     output: Annotated[
         Path | None,
         typer.Option("--output", "-o", help="File to write, or folder of csv and parquet  [default: in the run]"),
@@ -241,7 +241,7 @@ def export_command(
     force: Force = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress bar.")] = False,
 ) -> None:
-    """Write a run for other programs: tables, NWB, video, HTML, MJCF.
+    """Write a run for other programs: tables, NWB, HTML, MJCF.
 
     \b
     csv      a table for all signals of the same dimensions, units in the header; about.json says what the run is
@@ -249,12 +249,11 @@ def export_command(
     parquet  the same tables as csv, units in the metadata (pip install 'annelid[export]')
     nwb      Neurodata Without Borders: potentials as intracellular series, behaviour and positions beside
              (pip install 'annelid[export]')
-    mp4 gif  a video; annelid draw has camera, speed and frame rate
     html     one page that needs nothing else: numbers, figures, configuration, what to cite
     mjcf     the model for plain MuJoCo, the last state as a keyframe; of a worm that was not run with a keyframe rest
              where it has servos, to be loaded before the first step: in it their cables are paid out
 
-    A network or a whole controller is written by annelid export-network.
+    A video is drawn by annelid draw, a network or a whole controller written by annelid export-network.
 
     \b
     annelid export runs/riddle2023-rods-001 --to csv

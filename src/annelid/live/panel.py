@@ -17,11 +17,12 @@ from annelid.live.network import colors_html, network_html
 from annelid.live.picture import CONTACT_COLOR, SPRING_COLORS, SPRING_RANGE, STRAND_COLORS
 from annelid.live.player import FASTEST, SLOWEST
 from annelid.live.stage import LAYERS
-from annelid.live.view import View
 from annelid.morphology import Array
 
 if TYPE_CHECKING:
     import viser
+
+    from annelid.live.show import Show
 
 
 PLAY, NOW, AGAIN = "Play / pause", "Live", "Restart"
@@ -105,7 +106,7 @@ class Panel:
     def __init__(
         self,
         server: viser.ViserServer,
-        view: View,
+        view: Show,
         speed: float,
         weight_N: float | None,
         legend: str,
@@ -149,7 +150,7 @@ class Panel:
         """Force of a poke as set, N; 0 where nothing can be poked."""
         return float(self._poke.value) if self._poke is not None else 0.0
 
-    def _transport(self, view: View, speed: float) -> None:
+    def _transport(self, view: Show, speed: float) -> None:
         gui, player = self._gui, view.player
         living = player.worm is not None
         buttons = {PLAY: player.toggle, **({NOW: player.go_live} if living else {}), AGAIN: view.restart}
@@ -162,7 +163,7 @@ class Panel:
         pace = gui.add_slider("speed", SLOWEST, FASTEST, 0.05, speed, hint=hint)
         pace.on_update(_asking(view, setattr, player, "speed"))
 
-    def _physics(self, view: View, config: RunConfig, weight_N: float | None) -> None:
+    def _physics(self, view: Show, config: RunConfig, weight_N: float | None) -> None:
         gui = self._gui
         with gui.add_folder("Physics"):
             for knob in knobs_of(config):
@@ -176,7 +177,7 @@ class Panel:
             again = gui.add_button("Reset sliders", hint="Gives every slider above its first value.")
             again.on_click(lambda _: view.request(self._reset, view))
 
-    def _reset(self, view: View) -> None:
+    def _reset(self, view: Show) -> None:
         view.reset_knobs()
         assert view.player.worm is not None
         for knob, slider in self._knobs.items():
@@ -222,7 +223,7 @@ def _series(curve: Curve, colors: Sequence[str]) -> Any:
     return series | ({"dash": (6, 4), "width": 1.1} if curve.dashed else {"width": 1.6})
 
 
-def _asking(view: View, call: Callable[..., Any], *first: Any) -> Callable[[Any], None]:
+def _asking(view: Show, call: Callable[..., Any], *first: Any) -> Callable[[Any], None]:
     """Asks for a call with a slider's value as its last argument, if it was the user who moved it and not `Panel`."""
 
     def on_update(event: Any) -> None:

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from time import perf_counter
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from annelid.config import RunConfig
+from annelid.config import Knob, RunConfig
+from annelid.errors import AnnelidError
 from annelid.live.history import Moment
 from annelid.live.panel import Panel, Plot, legend_html, status_html
 from annelid.live.picture import hit_point, painter_of
 from annelid.live.player import player_of
 from annelid.live.server import LOOPBACK, Server
 from annelid.live.stage import Stage
-from annelid.live.view import View
 from annelid.simulation.runfile import Run
 
 if TYPE_CHECKING:
@@ -30,11 +30,18 @@ PANEL_INTERVAL_S = 0.33  # between two updates of plots, time and status
 PACE_OVER_S = 2.0  # over which the speed that is reached is measured
 
 
-class Show(View):
+class Show:
     """A server with the scene and the panel of one worm, and the loop that keeps them going.
 
+    All that changes the worm, the player or the scene is done by the loop; other threads `request` it.
+
     Attributes:
+        config: What the worm is run under, or was.
+        player: What is shown when.
+        stage: Where it is seen.
         panel: What is beside the scene.
+        follow: Whether the worm is kept in the middle, or may crawl away.
+        notice: A sentence for the user, or an empty one.
         address: Of the page, with the token that it opens with.
         frames_drawn: Number of pictures sent so far.
     """
@@ -61,16 +68,19 @@ class Show(View):
             ConfigError: The body cannot be viewed, or not be built.
             RunFileError: The run holds no postures.
         """
-        config = source.config if isinstance(source, Run) else source
-        player, anatomy = player_of(source, speed)
-        painter = painter_of(anatomy, config, player.moment)
+        self.config = config = source.config if isinstance(source, Run) else source
+        self.player, anatomy = player_of(source, speed)
+        painter = painter_of(anatomy, config, self.player.moment)
+        self.follow, self.notice = True, ""
+        self._requests: dict[tuple[Any, ...], tuple[Callable[..., None], tuple[Any, ...]]] = {}
+        self._lock = threading.Lock()
         self._ending = threading.Event()
         self._pace: deque[tuple[float, float]] = deque()
         self._drawn: tuple[Moment, bool] | None = None
         self.frames_drawn = 0
         self._server = Server(host, port)
         self.address = self._server.address
-        super().__init__(config, player, Stage(self._server, config, painter, player.moment))
+        self.stage = Stage(self._server, config, painter, self.player.moment)
         legend = legend_html(painter.arrow_N, painter.radius_m, is_planar=anatomy is None)
         self.panel = Panel(self._server, self, speed, painter.weight_N, legend, plots)
         if self.player.worm is not None and painter.weight_N is not None:
@@ -81,6 +91,41 @@ class Show(View):
 
     def __exit__(self, *_: object) -> None:
         self._server.stop()
+
+    def request(self, call: Callable[..., None], *arguments: Any) -> None:
+        """Has the loop call something; may be called from any thread.
+
+        Of calls that differ in their last argument only, as while a slider is dragged, the last one counts.
+        """
+        with self._lock:
+            self._requests[call.__name__, *arguments[:-1]] = call, arguments
+
+    def restart(self) -> None:
+        """Begins anew, with the sliders as they are."""
+        self.notice = ""
+        self.player.restart()
+
+    def set_knob(self, knob: Knob, shown: float) -> None:
+        """Changes a field of the running worm to what a slider shows."""
+        assert self.player.worm is not None
+        self.notice = ""
+        self.player.worm.adjust({knob.field: knob.value(shown)})
+
+    def reset_knobs(self) -> None:
+        """Gives every field that was changed its first value."""
+        assert self.player.worm is not None
+        self.notice = ""
+        self.player.worm.reset_fields()
+
+    def meet_requests(self) -> None:
+        """Makes the calls that were requested; the sentence of one that fails becomes the notice."""
+        with self._lock:
+            requests, self._requests = self._requests, {}
+        for call, arguments in requests.values():
+            try:
+                call(*arguments)
+            except AnnelidError as error:
+                self.notice = str(error)
 
     def run(self) -> None:
         """Keeps the view going until `end` is called."""

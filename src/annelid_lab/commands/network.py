@@ -42,8 +42,8 @@ def export_network_command(
     """Write a network for other programs, or a worm's whole controller for a microcontroller.
 
     \b
-    c     C99: of a preset or a configuration the controller with its sensors' thresholds, its start, its turning and
-          the muscles' activation; of a network from the currents of its inputs to the potentials of its outputs.
+    c     C99: of a preset or a configuration the controller with its sensors' thresholds, its start and the
+          muscles' activation; of a network from the currents of its inputs to the potentials of its outputs.
           A header, a source file and a self-test
     lems  LEMS, the language of NeuroML 2, for pyLEMS and jNeuroML: the network alone, of a preset too
     toml  the network alone as Network.to_toml writes it; reads LEMS files that annelid wrote

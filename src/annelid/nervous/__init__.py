@@ -22,7 +22,7 @@ from annelid.nervous.peristalsis import (
     peristalsis_network,
 )
 from annelid.nervous.stepper import GateStart, NetworkState, Scheme, Stepper
-from annelid.nervous.toml import network_of_tables, network_tables
+from annelid.nervous.toml import network_tables
 from annelid.nervous.wiring import Connection
 
 __all__ = [
@@ -47,7 +47,6 @@ __all__ = [
     "add_half_centre",
     "add_hold",
     "drive_conductance_uS",
-    "network_of_tables",
     "network_tables",
     "neuron_names",
     "peristalsis_network",

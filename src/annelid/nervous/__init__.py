@@ -64,6 +64,8 @@ __getattr__, __dir__ = lazy(
     {
         "Firing": _SPIKES,
         "SpikingSynapse": _SPIKES,
+        "Diagram": "annelid.draw.network_figure draws a network, and its method table() has the conductances",
+        "Factors": _MODULATION,
         "Modulated": _MODULATION,
         "ModulatorySynapse": _MODULATION,
         **dict.fromkeys(

@@ -13,14 +13,15 @@ import argparse
 from collections.abc import Callable
 from pathlib import Path
 from time import perf_counter, process_time
+from unittest.mock import patch
 
 import mujoco
 import numpy as np
 
-from annelid.arena.geoms import contact_options, touching
+from annelid.arena.geoms import contact_options, skin_geoms
+from annelid.arena.ground import surface_of
+from annelid.arena.kinds import pipe
 from annelid.arena.kinds.floor import Floor
-from annelid.arena.kinds.pipe import Pipe
-from annelid.arena.surface import surface_of
 from annelid.body import build_spec, compile_spec
 from annelid.body.constraint_rows import tendons_to_rows
 from annelid.body.worm import WormBody
@@ -69,7 +70,7 @@ class StillGround(WormPlant):
 
 def _add_contact_sensors(spec: mujoco.MjSpec) -> None:
     """Adds a sensor of the whole world's force on every vertex: one for each panel would be far too many."""
-    for geom in touching(spec):
+    for geom in skin_geoms(spec):
         spec.add_sensor(
             name=f"world_on_{geom.name}",
             type=mujoco.mjtSensor.mjSENS_CONTACT,
@@ -85,9 +86,7 @@ def panels(around: int) -> Ground:
     """Returns what adds a pipe of so many panels round it, or a height field."""
 
     def add(spec: mujoco.MjSpec, arena: ArenaKind, length_m: float) -> None:
-        if isinstance(arena, Pipe):
-            arena.add_panels(spec, length_m, around)
-        else:
+        with patch.object(pipe, "PANELS_AROUND", around):
             arena.add_panels(spec, length_m)
 
     return add

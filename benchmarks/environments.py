@@ -10,10 +10,11 @@ worm, its times CPU times.
 
 from __future__ import annotations
 
+import argparse
 import os
-import sys
 from pathlib import Path
 from time import perf_counter, process_time
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -43,16 +44,16 @@ def steps_per_s(mode: str, n_worms: int, seconds: float) -> float:
     return rate
 
 
-def throughput(path: str = "", seconds: float = 12.0) -> None:
-    """Prints steps a second of worms in this process and in processes of their own, and writes it as CSV."""
+def throughput(path: Path | None) -> None:
+    """Prints steps a second of worms in this process and in processes of their own; writes a path as CSV."""
     rows: list[list[object]] = []
     print("{:>5} {:>6} {:>8} {:>8}".format("load", "worms", *MODES))
     for n_worms in (1, 8, 64):
         load = os.getloadavg()[0]
-        rows.append([n_worms, *(steps_per_s(mode, n_worms, seconds) for mode in MODES)])
+        rows.append([n_worms, *(steps_per_s(mode, n_worms, 12.0) for mode in MODES)])
         print("{:5.1f} {:6} {:8.1f} {:8.1f}".format(load, *rows[-1]), flush=True)
     if path:
-        write_csv(Path(path), ["worms", *(f"{mode}_per_s" for mode in MODES)], rows)
+        write_csv(path, ["worms", *(f"{mode}_per_s" for mode in MODES)], rows)
 
 
 def timed_wave(time_s: float, n: int) -> np.ndarray:
@@ -61,11 +62,12 @@ def timed_wave(time_s: float, n: int) -> np.ndarray:
     return np.clip(np.minimum(since, 3.0 - since), 0.0, 1.0)
 
 
-def wave_speed(env_id: str, **options: object) -> tuple[float, float, str]:
+def wave_speed(env_id: str, **options: Any) -> tuple[float, float, str]:
     """Speed of a worm under the timed wave, body lengths/s; CPU time a simulated second; and how it ended."""
-    env = gymnasium.make(env_id, start_activation=0.0, **options)
+    env: Any = gymnasium.make(env_id, start_activation=0.0, **options)
     env.reset(seed=0)
-    info, ended, began = {"time_s": 0.0}, False, process_time()
+    info: dict[str, Any] = {"time_s": 0.0}
+    ended, began = False, process_time()
     n = env.action_space.shape[0]
     while not ended:
         action = timed_wave(info["time_s"] + env.unwrapped.task.interval_s, n)
@@ -76,7 +78,7 @@ def wave_speed(env_id: str, **options: object) -> tuple[float, float, str]:
     return info["travel"] / info["time_s"], seconds / info["time_s"], word
 
 
-def fidelity(path: str = "") -> None:
+def fidelity(path: Path | None) -> None:
     """Prints what worms of different resolution do under the same wave, and writes it as CSV where a path is given."""
     rows: dict[str, dict[str, object]] = {}
     print(f"{'':32}{'body lengths/s':>15}{'CPU s per s':>13}")
@@ -92,9 +94,12 @@ def fidelity(path: str = "") -> None:
             rows[name][arena] = speed
     if path:
         columns = ["worm", "open", "pipe.bend", "pipe.taper", "cpu_s_per_s"]
-        write_csv(Path(path), columns, ([row.get(column) for column in columns] for row in rows.values()))
+        write_csv(path, columns, ([row.get(column) for column in columns] for row in rows.values()))
 
 
 if __name__ == "__main__":
-    what, *path = sys.argv[1:] or ["throughput"]
-    (fidelity if what == "fidelity" else throughput)(*path)
+    parser = argparse.ArgumentParser()
+    parser.add_argument("what", choices=["throughput", "fidelity"])
+    parser.add_argument("csv", nargs="?", type=Path, help="file for the numbers")
+    given = parser.parse_args()
+    (fidelity if given.what == "fidelity" else throughput)(given.csv)

@@ -62,7 +62,7 @@ def random_network(seed: int) -> Network:
     def gate(slow: bool) -> Gate:
         power = float(rng.choice([1.0, 1.0, 2.0, 3.0]) if seed % 2 else rng.choice([1.0, 1.5]))
         numbers = rng.uniform(-0.1, 0.1), rng.uniform(-10.0, 30.0), rng.uniform(0.2, 2.0), power
-        return Gate(*map(float, numbers), rng.uniform(20.0, 300.0) if slow else None)
+        return Gate(*map(float, numbers), time_constant_ms=rng.uniform(20.0, 300.0) if slow else None)
 
     def channels() -> tuple[Channel, ...]:
         if seed % 3 == 0:

@@ -8,8 +8,8 @@ where it was stopped.
 
 from __future__ import annotations
 
+import argparse
 import csv
-import sys
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -177,4 +177,6 @@ def main(path: Path, robots: int = ROBOTS) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1] if len(sys.argv) > 1 else "identify_recovery.csv"))
+    parser = argparse.ArgumentParser()
+    parser.add_argument("csv", type=Path, help="file for the numbers, which goes on where it ended")
+    main(parser.parse_args().csv)

@@ -11,6 +11,7 @@ same cores as the worm; a browser with a graphics card leaves these to the worm.
 
 from __future__ import annotations
 
+import argparse
 import os
 import shutil
 import sys
@@ -35,7 +36,6 @@ WebGL2RenderingContext.prototype.bufferData = function (...given) {
 ARGUMENTS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 # Else the page around the scene is put together by the same software renderer, which takes as long as the scene.
 ARGUMENTS += ["--disable-gpu-compositing"]
-VIEWPORT = {"width": 1000, "height": 560}
 WARM_UP_S = 5.0
 
 
@@ -49,7 +49,13 @@ def browser_s() -> dict[str, float]:
     return spent
 
 
-def main(preset: str = "riddle2023-rods", seconds: float = 15.0, pixels: float = 1.0) -> None:
+def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("preset", nargs="?", default="riddle2023-rods")
+    parser.add_argument("seconds", nargs="?", type=float, default=15.0)
+    parser.add_argument("pixels", nargs="?", type=float, default=1.0)
+    given = parser.parse_args()
+    preset, seconds, pixels = given.preset, given.seconds, given.pixels
     chromium = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
     if chromium is None:
         sys.exit("there is no Chromium here")
@@ -58,7 +64,7 @@ def main(preset: str = "riddle2023-rods", seconds: float = 15.0, pixels: float =
         loop.start()
         try:
             browser = playwright.chromium.launch(executable_path=chromium, args=ARGUMENTS)
-            page = browser.new_page(viewport=VIEWPORT, device_scale_factor=pixels)
+            page = browser.new_page(viewport={"width": 1000, "height": 560}, device_scale_factor=pixels)
             page.add_init_script(COUNT_UPLOADS)
             page.goto(show.address)
             page.wait_for_selector("text=Nervous system", timeout=60_000)
@@ -88,4 +94,4 @@ def main(preset: str = "riddle2023-rods", seconds: float = 15.0, pixels: float =
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:2], *map(float, sys.argv[2:3]))
+    main()

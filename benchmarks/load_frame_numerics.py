@@ -23,7 +23,7 @@ WORM = dict(load_identify_study(ROBOT).set) | {
     "body.strands.shear_modulus_Pa": SHEAR_OVER_YOUNG * YOUNG_MODULUS_PA,
     "body.joints.dry_friction_Nm": DRY_FRICTION_NM,
 }
-CASES: dict[str, tuple[dict[str, Any], dict[str, float]]] = {
+CASES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "half the speed in the simulation": ({}, {"haste": 4.0}),
     "half the cable's speed": ({}, {"speed_m_per_s": 0.005}),
     "steps of 10 ms in place of 20": ({"clock.physics_timestep_s": 0.01}, {}),
@@ -36,7 +36,7 @@ def main() -> None:
     measured = read_loop()
     reach_m, at_m = float(measured.displacement_m.max()), measured.places(POINTS)
 
-    def forces(changes: dict[str, Any], options: dict[str, float]) -> NDArray[np.float64]:
+    def forces(changes: dict[str, Any], options: dict[str, Any]) -> NDArray[np.float64]:
         config = load_config("riddle2023-rods", WORM | changes)
         loop = load_frame(config, displacement_m=reach_m, **options)
         return cable_force(loop, CABLE_FRICTION).branches(at_m)

@@ -40,7 +40,6 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from annelid.simulation.two_step import TwoStep
 
 from annelid.body import compile_spec
 from annelid.body.constraint_rows import add_row, tendons_to_rows
@@ -50,6 +49,7 @@ from annelid.body.formulations.chain.capsules import SOLVER_ITERATIONS, add_chai
 from annelid.body.formulations.rods import Rods
 from annelid.body.formulations.rods.net import add_rod, add_vertex, lumped_masses
 from annelid.body.formulations.rods.strains import RodStrains, vertex_stiffness
+from annelid.body.formulations.rods.two_step import TwoStep
 from annelid.body.mesh import Strands
 from annelid.config import load_config
 from annelid.morphology import Array, helical_mesh

@@ -12,8 +12,10 @@ import pytest
 from annelid.body.worm import WormBody
 from annelid.config import (
     RunConfig,
+    Vary,
     arena_names,
     field_paths,
+    field_value,
     fields_of,
     load_config,
     loading,
@@ -22,6 +24,7 @@ from annelid.config import (
     preset_text,
 )
 from annelid.errors import ConfigError
+from annelid.experiment.space import variables_of
 from annelid_studies.planar.sections import PlanarWorm
 
 
@@ -207,6 +210,38 @@ def test_a_bad_value_is_named_with_what_would_be_valid(subtests: pytest.Subtests
             assert "\n" not in str(caught.value)
 
 
+def test_gone_fields_that_did_nothing_are_left_out_and_others_refused(tmp_path: Path) -> None:
+    mine = tmp_path / "mine.toml"
+    rods = '[body.formulation]\ncurvature = "linear"\nintegrator = "BDF2"\npin_inertance_kg = 0.0094\n'
+    mine.write_text(f"{rods}[guard]\nstretch = 1.1\n[arena]\nrail_gap_m = 'none'", encoding="utf-8")
+    assert load_config(mine).model_copy(update={"name": "riddle2023-rods", "summary": ""}) == load_config(
+        "riddle2023-rods", {"summary": "", "guard.ring_closure": 1.0}
+    )
+    robust = {"controller": {"kind": "sns-robust", "push_nA": 6.0, "entrainment": 0.02}}
+    assert load_config(robust) == load_config({"controller": {"kind": "sns-robust"}})
+    for path, value in (
+        ("controller.entrainment", 0.0),
+        ("guard.stretch", 0.0),
+        ("body.formulation.curvature", "constant"),
+    ):
+        with pytest.raises(ConfigError, match=rf"{path} is no field any more: .*; leave it out"):
+            load_config(robust, {path: value})
+
+
+def test_a_renamed_field_is_read_under_its_new_name(tmp_path: Path) -> None:
+    old, new = "controller.let_go_s", "controller.motor_time_constant_s"
+    base, mine = tmp_path / "base.toml", tmp_path / "mine.toml"
+    base.write_text("[controller]\nkind = 'sns-robust'\nmotor_time_constant_s = 0.1", encoding="utf-8")
+    mine.write_text(f"extends = '{base.as_posix()}'\n[controller]\nlet_go_s = 0.3", encoding="utf-8")
+    assert field_value(load_config(mine), new) == 0.3
+    assert field_value(load_config(mine, {new: 0.5}), new) == 0.5
+    with pytest.warns(UserWarning, match=f"{old} is now {new}"):
+        assert field_value(load_config(mine, {old: 0.7}), new) == 0.7
+    with pytest.warns(UserWarning, match=f"{old} is now {new}"):
+        (variable,) = variables_of([Vary.model_validate({"field": old, "values": [0.1]})], load_config(mine))
+    assert variable.field == new
+
+
 def test_a_field_of_the_other_formulation_is_refused() -> None:
     with pytest.raises(ConfigError, match="another kind"):
         load_config("riddle2023-rods", parse_assignments(["body.formulation.armature_kg_m2=0.1"]))
@@ -236,6 +271,14 @@ def test_unreadable_files_are_refused_in_one_sentence(tmp_path: Path) -> None:
     broken.write_text("duration_s = = 3", encoding="utf-8")
     with pytest.raises(ConfigError, match="not valid TOML"):
         load_config(broken)
+
+
+def test_names_that_are_gone_say_what_to_use() -> None:
+    import annelid.nervous
+
+    for name, instead in (("Diagram", "network_figure"), ("SpikingSynapse", "use a Synapse"), ("Factors", "excite")):
+        with pytest.raises(ImportError, match=rf"nervous\.{name} has been removed: .*{instead}"):
+            getattr(annelid.nervous, name)
 
 
 def test_names_that_have_moved_are_found_with_a_warning() -> None:

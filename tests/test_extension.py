@@ -126,6 +126,46 @@ def test_a_body_of_a_package_runs_and_is_checked_drawn_viewed_and_exported(
     assert len(list((installed / "tables").iterdir())) > 1
 
 
+def test_a_body_without_outlines_is_refused_where_they_are_needed(
+    installed: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(installed)
+    said = answer(
+        "-c",
+        "from typing import Literal\n"
+        "from annelid import load_config, simulate\n"
+        "from annelid.analysis import summary\n"
+        "from annelid.config import BodyKind\n"
+        "from annelid.draw import render_frame\n"
+        "from annelid.errors import ConfigError\n"
+        "from annelid.live.page import export_page\n"
+        "from annelid_standing_wave.bodies import MassChain\n"
+        "for planar in (True, False):\n"
+        "    name = f'bare-{planar}'.lower()\n"
+        "    own = {'is_planar': planar, 'outlines': BodyKind.outlines, 'kind': name, '__module__': __name__,\n"
+        "        '__annotations__': {'kind': Literal[name]}}\n"
+        "    type('Bare', (MassChain,), own)\n"
+        "    clock = {'physics_timestep_s': 0.001}\n"
+        "    tree = {'body': {'kind': name}, 'controller': {'kind': 'sine'}, 'clock': clock, 'duration_s': 0.1}\n"
+        "    config = load_config(tree)\n"
+        "    run = simulate(config, name, progress=False)\n"
+        "    assert summary(run).duration_s\n"
+        "    for ask in (lambda: render_frame(run, 0.05, 'a.png'), lambda: export_page(run, 'a.html'),\n"
+        "                lambda: export_page(config, 'b.html')):\n"
+        "        try:\n"
+        "            ask()\n"
+        "        except ConfigError as error:\n"
+        "            print(error)\n",
+        path=installed,
+    ).splitlines()  # fmt: skip
+    assert len(said) == 6
+    for kind, sentences in (("bare-true", said[:3]), ("bare-false", said[3:])):
+        for sentence in sentences:
+            assert sentence.startswith(f"body.kind = '{kind}'")
+            assert "is_planar = True" in sentence
+            assert "outlines(values)" in sentence
+
+
 @pytest.mark.slow
 def test_the_code_of_another_package_s_kind_is_part_of_a_kept_run_s_key(installed: Path) -> None:
     code = (

@@ -57,15 +57,17 @@ def test_the_turn_of_a_circle_is_its_curvature_whatever_the_swing(curvature: flo
 
 
 @settings(max_examples=20)
-@given(st.floats(-1.5, 1.5), st.floats(-3.1, 3.1), st.floats(-0.5, 0.5))
-def test_roll_is_about_the_body_whatever_its_heading_and_pitch(roll: float, heading: float, pitch: float) -> None:
-    """The left side of a worm that leads towards -x is at -y."""
+@given(st.floats(-10.0, 10.0), st.floats(-3.1, 3.1), st.floats(-0.5, 0.5))
+def test_roll_is_the_angle_about_the_body_beyond_whole_turns_whatever_its_heading_and_pitch(
+    roll: float, heading: float, pitch: float
+) -> None:
+    """A worm that leads towards -x has its left side at -y, which a positive roll lifts."""
     rest = GEOMETRY.crossings_m - GEOMETRY.crossings_m.mean(axis=0)
-    turns = (Rotation.from_euler("z", heading) * Rotation.from_euler("y", pitch), Rotation.from_euler("x", -roll))
-    posture = (turns[0] * turns[1]).apply(rest)
-    track = Track(np.arange(2.0), np.stack([turns[0].apply(rest), posture]), N_PER_PLANE, RINGS)
-    assert track.roll_rad == pytest.approx([0.0, roll], abs=1e-9)
-    assert posture[rest[:, 1].argmin(), 2] > turns[0].apply(rest)[rest[:, 1].argmin(), 2] or roll <= 0.1
+    rolls = roll * np.linspace(0.0, 1.0, 8)
+    lies = Rotation.from_euler("z", heading) * Rotation.from_euler("y", pitch)
+    postures = [(lies * Rotation.from_euler("x", -angle)).apply(rest) for angle in rolls]
+    track = Track(np.arange(8.0), np.stack(postures), N_PER_PLANE, RINGS)
+    assert track.roll_rad == pytest.approx(rolls, abs=1e-9)
 
 
 def test_a_straight_way_has_no_radius_and_a_left_turn_is_positive() -> None:

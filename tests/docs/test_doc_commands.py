@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import runpy
 import shutil
 import subprocess
 import sys
@@ -308,6 +309,15 @@ def test_what_takes_long_is_executed_in_short(
     output = () if "limit-cycle" in start else ("-o", "out")
     answer = CliRunner().invoke(app, [*words[1:], *shorter, *output], prog_name="annelid")
     assert answer.exit_code == 0, answer.output
+
+
+def test_the_names_that_a_benchmark_imports_are_there(
+    subtests: pytest.Subtests, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(ROOT / "benchmarks")
+    for script in sorted((ROOT / "benchmarks").glob("*.py")):
+        with subtests.test(script=script.name):
+            runpy.run_path(str(script), run_name=script.stem)
 
 
 @pytest.mark.slow

@@ -17,8 +17,9 @@ from annelid.experiment.check import HALF, MORE, RESOLVED, Check, check, compare
 from annelid.experiment.outcome import Outcome, outcome
 from annelid.experiment.store import Done
 from annelid.output import write_json
-from annelid.simulation import Run
+from annelid.simulation import Run, open_run
 from annelid.textfiles import read_json
+from outcome import Command
 
 
 @pytest.fixture(scope="module")
@@ -100,6 +101,30 @@ def test_a_checked_run_is_the_plain_run_and_a_second_call_computes_nothing(
     assert (again.config, same.to_dict()) == (run.config, found.to_dict())
     with pytest.raises(ConfigError, match="has another run in it"):
         check(load_config("riddle2022-planar", {"duration_s": 2.0}), tmp_path)
+
+
+@pytest.mark.usefixtures("runs_in_this_process")
+def test_whoever_interrupts_the_finer_runs_keeps_the_run_itself(
+    annelid: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    computed: list[str] = []
+
+    def interrupted(key: str, *rest: Any) -> None:
+        if computed:
+            raise KeyboardInterrupt
+        computed.append(key)
+        attempt(key, *rest)
+
+    attempt = store.attempt
+    monkeypatch.setattr(store, "attempt", interrupted)
+    command = ("run", "riddle2022-planar", "--duration", "0.5", "--check", "-o", str(tmp_path / "walk"))
+    done = annelid(*command)
+    assert done.exit_code == 130
+    assert "go on with: annelid run" in done.err
+    assert "3 segments, 0.5 s, complete" in done.out
+    assert done.out.splitlines()[-1] == str(tmp_path / "walk/run.nc")
+    assert (open_run(tmp_path / "walk").status, len(computed)) == ("complete", 1)
+    assert not (tmp_path / "walk/check.json").exists()
 
 
 def test_a_folder_in_use_is_refused_and_left_alone(tmp_path: Path) -> None:

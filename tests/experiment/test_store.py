@@ -71,13 +71,14 @@ def single(tmp_path: Path) -> Store:
 def test_every_case_is_computed_once_and_a_second_call_computes_nothing(tmp_path: Path) -> None:
     here, told = Here(), list[tuple[str, int, int, float]]()
     store = Store(tmp_path / "runs", here, progress=lambda *state: told.append(state))
-    first = store.compute([planar(0), planar(1, 0.2), planar(0)], "runs")
-    assert list(first) == [case_key(planar(0)), case_key(planar(1, 0.2))]
-    assert here.keys == [*first][::-1], "the longest comes first"
-    assert [state[:3] for state in told] == [("runs", 0, 2), ("runs", 1, 2), ("runs", 2, 2)]
-    assert told[1][3] == pytest.approx(2 / 3)
-    assert store.compute([planar(0), planar(1, 0.2)]) == first
-    assert len(here.keys) == len(folders(store)) == 2
+    cases = [planar(0), planar(3), planar(1, 0.2)]
+    first = store.compute([*cases, planar(0)], "runs")
+    assert list(first) == [*map(case_key, cases)]
+    assert here.keys == [case_key(cases[i]) for i in (0, 2, 1)], "behind the first the longest comes first"
+    assert [state[:3] for state in told] == [("runs", done, 3) for done in range(4)]
+    assert told[2][3] == pytest.approx(3 / 4)
+    assert store.compute(cases) == first
+    assert len(here.keys) == len(folders(store)) == 3
     assert float(store.run(planar(0)).data["time"][-1]) == pytest.approx(0.1, abs=0.01)
     assert planar(2) not in store
     with pytest.raises(KeyError, match="seed=2"):

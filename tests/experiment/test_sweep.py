@@ -293,6 +293,10 @@ def test_what_cannot_be_checked_is_refused_before_anything_runs(tmp_path: Path) 
     of = study(ONE, preset="riddle2023-rods", set={"clock.physics_timestep_s": 0.005})
     with pytest.raises(ConfigError, match=r"0\.005: half of it is no multiple .* set it to 0\.004 or 0\.006"):
         swept(of, tmp_path / "out", check=1)
+    steps = {"field": "clock.physics_timestep_s", "values": [0.004, 0.003, 1.5]}
+    varied = study([steps], preset="riddle2023-rods")
+    with pytest.raises(ConfigError, match=r"clock\.physics_timestep_s = 0\.003: .* set it to 0\.002 or 0\.004"):
+        swept(varied, tmp_path / "out", check=1)
     with pytest.raises(ConfigError, match="check = -1: must be at least 0"):
         swept(of, tmp_path / "out", check=-1)
     assert not list(tmp_path.iterdir())

@@ -42,6 +42,18 @@ ANYWHERE = {
     "endless": (scene('<geom type="sphere" size="1e999"/>'), "numbers must be finite"),
     "huge": (scene('<geom type="sphere" size="1e7"/>'), "at most 1e+06"),
     "not a number": (scene('<geom type="sphere" size="nan"/>'), "numbers must be finite"),
+    **{
+        f"number of C {number}": (scene(f'<geom type="sphere" size="{number}"/>'), f"<geom size='{number}'>: {reason}")
+        for number, reason in {
+            "0x1p30": "write '0x1p30' in decimals",
+            "-0X.8": "write '-0X.8' in decimals",
+            "nan(1)": "write 'nan(1)' in decimals",
+            "infinity": "numbers must be finite",
+            "-INF": "numbers must be finite",
+        }.items()
+    },
+    "number of C among others": (scene('<geom size="0.1" pos="0 0x1p30 0"/>'), "write '0x1p30' in decimals"),
+    "amount of C": (scene(before='<asset><texture name="t" builtin="flat" width="0x4000"/></asset>'), "in decimals"),
     "many pixels": (scene(before=f"<asset>{TEXTURE * 2}</asset>"), "at most 4,000,000"),
     "many samples": (
         scene(before='<asset><hfield name="h" nrow="90000" ncol="90000" size="1 1 1 1"/></asset>'),

@@ -13,7 +13,9 @@ import pytest
 import xarray
 from toy import SavedToyPlant, ToyController, toy_config, without_digest
 
+from annelid.analysis import compare
 from annelid.config import RunConfig, load_config
+from annelid.errors import RunFileError
 from annelid.simulation import open_run, simulate
 from annelid.simulation.runfile import migrated, read_config, verify_run
 
@@ -51,6 +53,9 @@ def test_a_file_of_annelid_0_1_is_read(tmp_path: Path) -> None:
     assert (old.status, old.cpu_time_s) == (run.status, 0.0)
     assert [doubt.startswith("body.strands.joint_damping_Nms_per_rad was 0.07") for doubt in old.warnings] == [True]
     xarray.testing.assert_equal(old.data, run.data)
+    assert compare([old, old]).numbers["duration_s"][0] == run.config.duration_s
+    with pytest.raises(RunFileError, match=r"cannot be continued: body\.strands\.joint_damping_Nms_per_rad acted"):
+        simulate(None, tmp_path / "on", resume=old, plant=SavedToyPlant(), controller=ToyController())
     assert "older version" in verify_run(tmp_path / "run.nc")
 
 
@@ -76,6 +81,8 @@ def test_the_name_decided_what_is_published_up_to_schema_1(subtests: pytest.Subt
 
 PRESSURE = {"body": {"kind": "worm"}, "controller": {"kind": "sns-pressure"}}
 RODS = {"extends": "riddle2023-rods"}
+ROBUST = {**RODS, "controller": {"kind": "sns-robust", "motor_time_constant_s": 0.2}}
+BLIND = {**RODS, "trial": {"blind": True}}
 SOFT = {**RODS, "body": {"formulation": {"pins": "separate"}}}
 ROUGH = {**RODS, "arena": {"kind": "rough"}}
 POSTS = {**RODS, "arena": {"kind": "floor", "posts": [[1.0, 2.0, 0.1]]}}
@@ -92,6 +99,9 @@ POSTS = {**RODS, "arena": {"kind": "floor", "posts": [[1.0, 2.0, 0.1]]}}
         (RODS, 5, {"body.formulation.solver_iterations": 100}, "solver_iterations was 100"),
         (ROUGH, 5, {"arena.posts": None, "arena.rail_gap_m": None}, None),
         (POSTS, 5, {"body.formulation.solver_tolerance": None}, None),
+        (ROBUST, 6, {"controller.push_nA": 6.0, "controller.let_go_s": 0.2}, None),
+        (ROBUST, 6, {"controller.entrainment": 0.0}, "controller.entrainment was 0.0"),
+        (BLIND, 6, {"trial.loss_s": 0.2}, None),
         (ROUGH, 5, {"arena.posts": [[1.0, 2.0, 0.1]]}, "arena.posts was"),
     ],
 )

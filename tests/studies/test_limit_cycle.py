@@ -205,6 +205,7 @@ def test_loops_without_a_limit_cycle_of_their_own_are_refused(subtests: pytest.S
         (r"sensor\.noise_m = 0\.001", lambda: limit_cycle(worm(fields={"sensor.noise_m": 0.001}))),
         (r"longer than sensor\.startup_hold_s", lambda: limit_cycle(worm(), settle_s=0.0)),
         (r"no state 'contraction_7'.*contraction_", lambda: limit_cycle(worm(), neuron="contraction_7")),
+        (r"have 420 continuous states; .* at most 400: choose fewer segments", lambda: limit_cycle(worm(60))),
         (r"no limit cycle .* choose the body riddle2022", lambda: limit_cycle(load_config("riddle2023-rods"))),
     ):
         with subtests.test(says), pytest.raises(ConfigError, match=says):

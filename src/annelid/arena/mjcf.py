@@ -7,6 +7,7 @@ and whatever comes out of a configuration or a run file is checked again before 
 
 from __future__ import annotations
 
+import re
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -40,6 +41,8 @@ _REFUSED = {
 }
 """Elements that no text can have, and what to do instead."""
 _LENGTHRANGE = frozenset(["mode", "useexisting", "uselimit", "tolrange"])
+_UNREAD = re.compile(r"[+-]?(0x[0-9a-f.]|nan\()", re.IGNORECASE)
+"""Begins a number that the engine reads and Python does not, which would pass every limit."""
 
 
 @dataclass(frozen=True)
@@ -196,11 +199,13 @@ def numbers_of(element: ET.Element, name: str) -> list[float]:
     """Returns the numbers among the words of an attribute.
 
     Raises:
-        ConfigError: One is not finite, or larger than any that is read.
+        ConfigError: One is not written in decimals, not finite, or larger than any that is read.
     """
     largest = _MOST_ITERATIONS if name.endswith("iterations") else _LARGEST_OF.get(name, _LARGEST)
     numbers = []
     for word in element.get(name, "").split():
+        if _UNREAD.match(word):
+            raise ConfigError(f"<{element.tag} {name}={shown(element.get(name))}>: write {shown(word)} in decimals")
         try:
             numbers.append(float(word))
         except ValueError:

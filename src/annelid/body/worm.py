@@ -235,6 +235,6 @@ def worm_of(config: RunConfig) -> WormBody:
     if not isinstance(config.body, WormBody):
         raise ConfigError(
             f"body.kind = {config.body.kind!r} has no strands, rings and springs: this needs the 3D worm "
-            "(body.kind = 'worm')"
+            "(body.kind = 'worm'). A planar body sets is_planar = True and has a method outlines(values)"
         )
     return config.body

@@ -27,7 +27,7 @@ from annelid.cli.common import (
 )
 from annelid.cli.entry import EXIT_INTERRUPTED, command, complain, end_study, lock
 from annelid.cli.json_output import wants_json
-from annelid.errors import ConfigError, SimulationStopped
+from annelid.errors import ConfigError, RunFileError, SimulationStopped
 
 
 @command("run", "Make")
@@ -148,12 +148,20 @@ def run_command(
 
             spread = error_bars.read_spread(uncertainty_from).but(_errors(vary))
             further = ["--out", str(folder)] if out is None else []
-            with going_on(folder, *further), study_progress(quiet=quiet) as shown:
-                how: dict[str, Any] = {"jobs": jobs, "overwrite": force, "progress": shown}
-                if uncertainty is None:
-                    _, checked = check_run(config, folder, **how)
-                else:
-                    result = error_bars.uncertainty(config, uncertainty, folder, spread=spread, **how)
+            try:
+                with going_on(folder, *further), study_progress(quiet=quiet) as shown:
+                    how: dict[str, Any] = {"jobs": jobs, "overwrite": force, "progress": shown}
+                    if uncertainty is None:
+                        _, checked = check_run(config, folder, **how)
+                    else:
+                        result = error_bars.uncertainty(config, uncertainty, folder, spread=spread, **how)
+            except typer.Exit:
+                # Interrupted: the run itself may be done.
+                with suppress(RunFileError):
+                    if (left := open_run(folder)).config == config:
+                        print_run(left, quiet=quiet)
+                        print_paths([left.path])
+                raise
             done = open_run(folder)
         else:
             progress = False if quiet else _lines(config.duration_s)

@@ -10,14 +10,11 @@ from __future__ import annotations
 
 from annelid.config.answers import Elements, Finding, OwnModel
 from annelid.config.checking import (
-    CONSTANT,
-    REPLACED,
     check_config,
     check_section,
     field_paths,
     field_value,
     fields_of,
-    has_field,
     unit_of,
     whole_path,
 )
@@ -41,9 +38,7 @@ from annelid.config.study import Study, Vary, load_study
 from annelid.textfiles import toml_value
 
 __all__ = [
-    "CONSTANT",
     "LEVELS",
-    "REPLACED",
     "ArenaKind",
     "BodyKind",
     "Choice",
@@ -81,7 +76,6 @@ __all__ = [
     "field_value",
     "fields_of",
     "find_level",
-    "has_field",
     "kinds_of",
     "load_config",
     "load_study",

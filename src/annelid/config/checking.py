@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from difflib import get_close_matches
+from functools import reduce
 from typing import Any, TypeVar, get_origin
 
 from pydantic import BaseModel, ValidationError
@@ -19,8 +21,11 @@ Checked = TypeVar("Checked", bound=Section)
 
 
 def check_config(tree: Mapping[str, Any]) -> RunConfig:
-    """Turns a nested mapping into a checked `RunConfig`, or raises `ConfigError` naming the field."""
-    return check_section(RunConfig, tree)
+    """Turns a nested mapping into a checked `RunConfig`, or raises `ConfigError` naming the field.
+
+    Gone fields that did nothing, which files of older versions have, are left out.
+    """
+    return check_section(RunConfig, present_fields(tree)[0])
 
 
 def check_section(section: type[Checked], tree: Mapping[str, Any]) -> Checked:
@@ -98,80 +103,128 @@ UNITS = frozenset(
 _SYMBOLS = {"Nms": "N m s", "Nm": "N m", "Ns": "N s", "m2": "m²", "s2": "s²", "uS": "µS"}
 
 
-REPLACED = {
-    "body.formulation.curvature": "a strand's curvature is always linear between two crossings",
-    "body.formulation.integrator": "rods always take second-order steps (BDF2), a chain those of Runge and Kutta",
-    "body.formulation.joint": "a chain's elements are always joined by three hinges",
-    "body.formulation.pins": "a chain's strands are always tied to a pin between them",
-    "body.formulation.pin_inertance_kg": "pins are tied by springs and dashpots alone",
-    "body.formulation.lateral_damping_Nms_per_rad": "set body.strands.damping_time_s, which damps every direction",
-    "body.strands.joint_damping_Nms_per_rad": "set body.strands.damping_time_s, a joint's damping over its stiffness",
-    "body.strands.loss_factor": "set body.strands.damping_time_s to the loss factor over 2 pi times its frequency",
-    "body.strands.loss_frequency_Hz": "set body.strands.damping_time_s, as for loss_factor",
-    "body.strands.relative_stiffness": "all strands are alike; segments may differ (body.strands.young_modulus_Pa)",
-    "arena.rail_gap_m": "guard rails stand on arena.kind = 'floor' only",
-    "arena.posts": "posts stand on arena.kind = 'floor' only",
-    "arena.friction_cone": "rods always have elliptic cones, and a chain pyramidal ones",
-    "body.formulation.solver_iterations": "the solver's limits are constants of the formulation",
-    "body.formulation.solver_tolerance": "the solver's limits are constants of the formulation",
-    "guard.pin_gap_m": "the two strands of a crossing may always part by 15 cm",
-    "guard.ring_closure": "a ring may always be as short as its crossings are wide",
-    "guard.stretch": "an axial spring may always be 1.1 times as long as the straight strands beside it",
-    "controller.landing": "it saved nothing (sns-pressure)",
-    "controller.let_go_s": "it is controller.motor_time_constant_s",
-    "controller.drive_slope_per_s": "a drive is constant during a run",
-    "controller.stretch_gain_per_m": "a drive is constant during a run",
-    "controller.drive_time_constant_s": "the descending neuron of 'adaptive' has 0.05 s",
-    "controller.light_N": "'sns-pressure' has the loads of the six-segment robot",
-    "controller.full_N": "'sns-pressure' has the loads of the six-segment robot",
-    "controller.extending_m": "'sns-pressure' has the lengths of the six-segment robot",
-    "controller.extended_m": "'sns-pressure' has the lengths of the six-segment robot",
-    "controller.pressure_time_constant_s": "the pressure neurons of 'sns-pressure' have 0.03 s",
-    "controller.limbs": "'phase-chain' has no limbs",
-    "controller.coupling_per_s": "'phase-chain' has the salamander's coupling",
-    "trial.loss_s": "a loss lasts 0.2 s",
-    "turning.arm_N": "'touch' is the published rule",
-    "turning.hold_s": "'touch' is the published rule",
-    "turning.least_N": "'touch' is the published rule",
-    "turning.full_N": "'touch' is the published rule",
-    "turning.rate_per_s": "'touch' is the published rule",
+RENAMED = {"controller.let_go_s": "controller.motor_time_constant_s"}
+"""Fields that go on under another name, by dotted path."""
+_LOADS = ("'sns-pressure' has the loads of the six-segment robot", "'sns-pressure' has the lengths of the same robot")
+_SOLVER = "the solver's limits are constants of the formulation"
+_TOUCH = "'touch' is the published rule"
+_ROBUST = {
+    "capacitance_nF": 5.0,
+    "leak_conductance_uS": 1.0,
+    "range_mV": 20.0,
+    "bifurcation_mV": -1.0,
+    "offset_mV": 0.1,
+    "inhibitory_reversal_mV": -40.0,
+    "excitatory_reversal_mV": 194.0,
+    "sodium_reversal_mV": 110.0,
+    "gate_slope_per_mV": 0.05,
+    "gate_time_constant_ms": 300.0,
+    "push_nA": 6.0,
+    "entrainment": 0.02,
+    "habit_ms": 10000.0,
+    "full_stretch_m": 0.08,
+    "scheme": "euler",
 }
-"""What replaced fields that older files have, by their dotted paths."""
-CONSTANT = {
-    "guard.pin_gap_m": 0.15,
-    "guard.ring_closure": 1.0,
-    "guard.stretch": 1.1,
-    "controller.capacitance_nF": 5.0,
-    "controller.leak_conductance_uS": 1.0,
-    "controller.range_mV": 20.0,
-    "controller.bifurcation_mV": -1.0,
-    "controller.offset_mV": 0.1,
-    "controller.inhibitory_reversal_mV": -40.0,
-    "controller.excitatory_reversal_mV": 194.0,
-    "controller.sodium_reversal_mV": 110.0,
-    "controller.gate_slope_per_mV": 0.05,
-    "controller.gate_time_constant_ms": 300.0,
-    "controller.push_nA": 6.0,
-    "controller.entrainment": 0.02,
-    "controller.habit_ms": 10000.0,
-    "controller.full_stretch_m": 0.08,
-    "controller.scheme": "euler",
-    "controller.drive_time_constant_s": 0.05,
-    "controller.light_N": 2.5,
-    "controller.full_N": 9.0,
-    "controller.extending_m": 0.045,
-    "controller.extended_m": 0.055,
-    "controller.pressure_time_constant_s": 0.03,
-    "controller.coupling_per_s": 10.0,
-    "trial.loss_s": 0.2,
-    "turning.arm_N": 2.0,
-    "turning.hold_s": 6.0,
-    "turning.least_N": 1.0,
-    "turning.full_N": 15.0,
-    "turning.rate_per_s": 10.0,
+GONE: Mapping[str, tuple[str, Any]] = {
+    "body.formulation.curvature": ("a strand's curvature is always linear between two crossings", "linear"),
+    "body.formulation.integrator": (
+        "rods always take second-order steps (BDF2), a chain those of Runge and Kutta",
+        ("BDF2", "RK4"),
+    ),
+    "body.formulation.joint": ("a chain's elements are always joined by three hinges", "hinges"),
+    "body.formulation.pins": ("a chain's strands are always tied to a pin between them", "separate"),
+    "body.formulation.pin_inertance_kg": ("pins are tied by springs and dashpots alone", 0),
+    "body.formulation.lateral_damping_Nms_per_rad": (
+        "set body.strands.damping_time_s, which damps every direction",
+        0,
+    ),
+    "body.strands.joint_damping_Nms_per_rad": (
+        "set body.strands.damping_time_s, a joint's damping over its stiffness",
+        0,
+    ),
+    "body.strands.loss_factor": (
+        "set body.strands.damping_time_s to the loss factor over 2 pi times its frequency",
+        0,
+    ),
+    "body.strands.loss_frequency_Hz": ("set body.strands.damping_time_s, as for loss_factor", None),
+    "body.strands.relative_stiffness": (
+        "all strands are alike; segments may differ (body.strands.young_modulus_Pa)",
+        None,
+    ),
+    "arena.rail_gap_m": ("guard rails stand on arena.kind = 'floor' only", None),
+    "arena.posts": ("posts stand on arena.kind = 'floor' only", []),
+    "arena.friction_cone": ("rods always have elliptic cones, and a chain pyramidal ones", ()),
+    "body.formulation.solver_iterations": (_SOLVER, (300, 500)),
+    "body.formulation.solver_tolerance": (_SOLVER, (1e-6, 1e-8)),
+    "guard.pin_gap_m": ("the two strands of a crossing may always part by 15 cm", 0.15),
+    "guard.ring_closure": ("a ring may always be as short as its crossings are wide", 1.0),
+    "guard.stretch": ("an axial spring may always be 1.1 times as long as the straight strands beside it", 1.1),
+    "controller.landing": ("it saved nothing (sns-pressure)", 0),
+    "controller.drive_slope_per_s": ("a drive is constant during a run", 0),
+    "controller.stretch_gain_per_m": ("a drive is constant during a run", 0),
+    "controller.drive_time_constant_s": ("the descending neuron of 'adaptive' has 0.05 s", 0.05),
+    "controller.light_N": (_LOADS[0], 2.5),
+    "controller.full_N": (_LOADS[0], 9.0),
+    "controller.extending_m": (_LOADS[1], 0.045),
+    "controller.extended_m": (_LOADS[1], 0.055),
+    "controller.pressure_time_constant_s": ("the pressure neurons of 'sns-pressure' have 0.03 s", 0.03),
+    "controller.limbs": ("'phase-chain' has no limbs", False),
+    "controller.coupling_per_s": ("'phase-chain' has the salamander's coupling", 10.0),
+    "trial.loss_s": ("a loss lasts 0.2 s", 0.2),
+    "turning.arm_N": (_TOUCH, 2.0),
+    "turning.hold_s": (_TOUCH, 6.0),
+    "turning.least_N": (_TOUCH, 1.0),
+    "turning.full_N": (_TOUCH, 15.0),
+    "turning.rate_per_s": (_TOUCH, 10.0),
+    **{
+        f"controller.{name}": ("a constant of annelid.nervous.robust for 'sns-robust'", value)
+        for name, value in _ROBUST.items()
+    },
 }
-"""Values of fields that are constants now: an older file with such a value says nothing else."""
-REPLACED |= {path: "a constant of annelid.nervous.robust for 'sns-robust'" for path in CONSTANT if path not in REPLACED}
+"""Fields that are gone, by dotted path: what replaced each, and the value or values with which it did nothing, beside
+None."""
+
+
+def present_fields(tree: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Takes from a configuration of any version the names that are gone and mean nothing more.
+
+    Args:
+        tree: The configuration; need not be checked.
+
+    Returns:
+        It with renamed fields under their present names and without gone ones that did nothing; the gone ones that
+        acted, which it still has, with their values, by dotted path.
+    """
+    present, acted = dict(tree), dict[str, Any]()
+    for path in (*RENAMED, *GONE):
+        *above, leaf = path.split(".")
+        section = reduce(lambda part, name: part.get(name) if isinstance(part, Mapping) else None, above, tree)
+        if not isinstance(section, Mapping) or leaf not in section or has_field(path, tree):
+            continue
+        value = section[leaf]
+        if path in GONE and not _did_nothing(path, value, tree):
+            acted[path] = value
+            continue
+        section = present
+        for name in above:
+            section[name] = section = dict(section[name])
+        del section[leaf]
+        if path in RENAMED:
+            section[RENAMED[path].rpartition(".")[2]] = value
+    return present, acted
+
+
+def _did_nothing(path: str, value: Any, tree: Mapping[str, Any]) -> bool:
+    """Whether a field that is gone had a value that its worm has without it."""
+    idle = GONE[path][1]
+    body = tree.get("body")
+    formulation = body.get("formulation") if isinstance(body, Mapping) else None
+    formulation = formulation if isinstance(formulation, Mapping) else {}
+    if path == "body.formulation.pin_inertance_kg" and formulation.get("pins") != "separate":
+        return True
+    if path == "arena.friction_cone":
+        idle = "pyramidal" if formulation.get("kind") == "chain" else "elliptic"
+    return value in (*(idle if isinstance(idle, tuple) else (idle,)), None, "none")
 
 
 def has_field(path: str, tree: Mapping[str, Any]) -> bool:
@@ -204,7 +257,8 @@ def whole_path(path: str, tree: Mapping[str, Any]) -> str:
         tree: The configuration that it belongs to, whose kinds of sections decide; need not be checked.
 
     Returns:
-        The path of the one field that differs by a unit only, or else the path as it is.
+        The path of the one field that differs by a unit only, or the present one of a field that was renamed, or else
+        the path as it is.
 
     Raises:
         ConfigError: Several fields differ by a unit only.
@@ -213,6 +267,9 @@ def whole_path(path: str, tree: Mapping[str, Any]) -> str:
     names = _names_beside(path, tree)
     if leaf in names:
         return path
+    if path in RENAMED:
+        warnings.warn(f"{path} is now {RENAMED[path]}", stacklevel=2)
+        return RENAMED[path]
     start = f"{leaf}_"
     whole = [n for n in names if n.startswith(start) and UNITS.issuperset(n.removeprefix(start).split("_"))]
     if len(whole) > 1:
@@ -285,10 +342,10 @@ def _explain(detail: ErrorDetails, root: type[Section], tree: Any) -> str:
     if kind == "extra_forbidden":
         unknown = str(detail["loc"][-1])
         path = ".".join([*parts, unknown])
-        # A constant of one kind may be a field of another.
-        elsewhere = path in CONSTANT and path in field_paths()
-        if path in REPLACED and root is RunConfig and not elsewhere:
-            return f"{path} is no field any more: {REPLACED[path]}; leave it out"
+        # What is gone from one kind may be a field of another.
+        elsewhere = path.startswith("controller.") and path in field_paths()
+        if path in GONE and root is RunConfig and not elsewhere:
+            return f"{path} is no field any more: {GONE[path][0]}; leave it out"
         return f"unknown field {shown(path)}: {_nearest_fields(unknown, parts, section, root)}"
     path = ".".join(parts)
     if kind == "missing":

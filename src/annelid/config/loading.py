@@ -11,7 +11,7 @@ from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
-from annelid.config.checking import check_config, field_value, whole_path
+from annelid.config.checking import check_config, field_value, present_fields, whole_path
 from annelid.config.fidelity import HOME, RESOLUTION, find_level
 from annelid.config.kinds import kind_of_file
 from annelid.config.run import SHARED, ArenaKind, BodyKind, RunConfig
@@ -214,7 +214,8 @@ def _parse_value(text: str) -> Any:
 
 
 def _read_tree(source: str | Path | Mapping[str, Any]) -> dict[str, Any]:
-    return reduce(_merge, (tree for _, tree in _layers(source)), {})
+    """Merges what a source states over what it extends, renamed fields under their present names."""
+    return reduce(lambda base, change: present_fields(_merge(base, change))[0], (own for _, own in _layers(source)), {})
 
 
 def _layers(

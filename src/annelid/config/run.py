@@ -171,8 +171,14 @@ class BodyKind(Checked, Kind):
         Returns:
             Corners of every segment in the order in which they are drawn, x and z, m, ``(.., n_segments, n_corners,
             2)``.
+
+        Raises:
+            ConfigError: It is no planar body, or one without this method.
         """
-        raise NotImplementedError(f"body.kind = {self.kind!r} gives no outlines")
+        raise ConfigError(
+            f"body.kind = {self.kind!r} cannot be drawn or viewed: its class gives no outlines. Write its method "
+            "outlines(values) and set is_planar = True; docs/how_to/own_kind.md has an example"
+        )
 
     @property
     def first_heading_deg(self) -> float:

@@ -173,7 +173,7 @@ class CircuitController(SegmentController):
         worst = int(np.argmin((potential >= low) & (potential <= high)))
         return (
             f"potential of {self.stepper.arrays.neurons[worst]} is {potential[worst]:.4g} mV, outside "
-            f"{low:g} .. {high:g} mV: the control timestep of {self.stepper.timestep_ms:g} ms is too long"
+            f"{low:g} .. {high:g} mV, which currents reach: clock.control_timestep_s = {self.timestep_s:g} is too long"
         )
 
     @cached_property

@@ -259,7 +259,7 @@ def check(
         ConfigError: Half of the step does not fit the control step, or the folder is in use.
         RunFileError: A file cannot be written.
         SimulationStopped: A guard stopped the run itself; its file is kept.
-        KeyboardInterrupt: Finished runs are kept.
+        KeyboardInterrupt: Finished runs are kept, the run itself also as ``run.nc``.
     """
     folder = Path(folder)
     finer, left_out = refinements(config)

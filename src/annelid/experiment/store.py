@@ -126,7 +126,7 @@ class Store:
         progress: StudyProgress | None = None,
         failed: MutableMapping[str, Exception] | None = None,
     ) -> Mapping[str, Outcome]:
-        """Runs those cases that are not there yet, the longest first.
+        """Runs those cases that are not there yet: the first one first, then the longest.
 
         Args:
             cases: The cases; a case given twice runs once.
@@ -146,7 +146,9 @@ class Store:
         """
         wanted = {case_key(case): case for case in cases}
         found = {key: kept for key, case in wanted.items() if (kept := self._kept(case)) is not None}
-        missing = sorted((key for key in wanted if key not in found), key=lambda key: -wanted[key].cost_s)
+        first = next(iter(wanted), None)
+        missing = [key for key in wanted if key not in found]
+        missing.sort(key=lambda key: (key != first, -wanted[key].cost_s))
         errors = {} if failed is None else failed
         left_s = total_s = sum(wanted[key].cost_s for key in missing)
 

@@ -255,9 +255,13 @@ def swept(
     plan = plan_of(study)
     if check < 0:
         raise ConfigError(f"check = {check}: must be at least 0")
-    if check:
-        refinements(plan.base)
     cases = [case for _, case in plan.points]
+    for case in cases if check else ():
+        try:
+            config = case.config
+        except ConfigError:
+            continue  # It is listed with its reason.
+        refinements(config)
     store = Store(folder / RUNS, executor, study.keep, progress)
     done = store.finish(cases, "sweep")
     if all(one.refused for one in done) and done[0].error is not None:

@@ -79,7 +79,8 @@ def run_with_variants(
         ConfigError: The folder is in use, or the worm means nothing.
         RunFileError: A file cannot be written.
         SimulationStopped: A guard stopped the run itself; its file is kept.
-        KeyboardInterrupt: Runs in progress are dropped, all others kept for a later call.
+        KeyboardInterrupt: Runs in progress are dropped, all others kept for a later call, the worm's own also as
+            ``run.nc``.
     """
     if overwrite or not (folder / runs).is_dir():
         refuse_used_folder(folder, overwrite)
@@ -87,12 +88,17 @@ def run_with_variants(
         raise ConfigError(f"the output folder {folder} has another run in it: name another, or allow overwriting")
     cases = [Case(config.name, changed, config) for changed in ({}, *variants)]
     with workers(executor, jobs) as given:
-        done = Store(folder / runs, given, progress=progress).finish(cases, runs)
+        store = Store(folder / runs, given, progress=progress)
+        try:
+            done = store.finish(cases, runs)
+        finally:
+            # Also where the variants are interrupted.
+            if cases[0] in store:
+                with whole_file(folder / FILE_NAME) as draft:
+                    shutil.copyfile(store.path(cases[0]) / FILE_NAME, draft)
     itself = done[0].outcome
     if itself is None:
         raise done[0].error or ConfigError(done[0].reason)
-    with whole_file(folder / FILE_NAME) as draft:
-        shutil.copyfile(itself.path / FILE_NAME, draft)
     if itself.message:
         raise SimulationStopped(itself.message)
     return done

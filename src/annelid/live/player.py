@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from annelid.body import worm_of
 from annelid.config import RunConfig
 from annelid.errors import ConfigError, SimulationStopped
 from annelid.live.history import History, Moment, history_of
@@ -115,6 +116,8 @@ def player_of(source: RunConfig | Run, speed: float = 1.0) -> tuple[Player, Anat
     body = source.config.body if isinstance(source, Run) else source.body
     if body.own_model is not None:
         raise ConfigError(f"body.kind = {body.kind!r} cannot be viewed: use annelid run and annelid draw")
+    if not body.is_planar:
+        worm_of(source.config if isinstance(source, Run) else source)
     if isinstance(source, Run):
         anatomy = None if body.is_planar else compile_worm(source.config)
         return Player(history_of(source, None if anatomy is None else anatomy.model.nq), speed), anatomy

@@ -9,7 +9,7 @@ from typing import Any
 from annelid.config import RunConfig, field_value, fields_of
 from annelid.errors import ConfigError
 from annelid.simulation.checkpoint import Checkpoint
-from annelid.simulation.runfile import Run, examined_file, read_checkpoint, read_config
+from annelid.simulation.runfile import Run, examined_file, read_checkpoint, read_config, refuse_gone_numerics
 
 _FREE = frozenset({"duration_s", "record", "name", "summary", "published"})
 """Fields in which a continued run may differ from the one before it."""
@@ -34,8 +34,9 @@ class Origin:
 
 
 def origin_of(run: Run | str | Path) -> Origin:
-    """Reads what is needed to continue a run; raises as `read_checkpoint`."""
+    """Reads what is needed to continue a run; raises as `read_checkpoint` and `refuse_gone_numerics`."""
     path = examined_file(run.path if isinstance(run, Run) else run)[0]
+    refuse_gone_numerics(path)
     return Origin(path, read_config(path), read_checkpoint(path))
 
 

@@ -9,13 +9,15 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import reduce
+from operator import getitem
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pydantic import ValidationError
 
-from annelid.config import CONSTANT, REPLACED, RunConfig, has_field
+from annelid.config import RunConfig
+from annelid.config.checking import GONE, present_fields
 from annelid.errors import ConfigError, RunFileError, UnreadableText
 from annelid.registry import Registry
 from annelid.simulation import digest
@@ -37,6 +39,8 @@ SCHEMA_VERSION = 7
 `migrated` brings older files up to it. Files of annelid 0.1 say none, which counts as 0."""
 CHECKED_ON_OPENING_BYTES = 64_000_000
 """Files up to this size are compared with their digests whenever they are opened; larger ones by `verify_run` only."""
+ACTED = "gone_fields"
+"""Attribute that `migrated` gives files of older versions: the gone fields that acted, by name."""
 SLOTS = ("checkpoint/slot_0", "checkpoint/slot_1")
 STATUSES = ("running_or_killed", "complete", "interrupted", "stopped_by_guard", "disk_failure", "failed")
 """How a run ended, in the order of the file's ``status_code``; ``failed``: its plant or controller raised."""
@@ -137,7 +141,8 @@ def migrated(data: xarray.Dataset) -> xarray.Dataset:
     Files of schema 0, those of annelid 0.1, have neither warnings nor processor time. Their configuration is valid as
     it is: fields that are newer default to what 0.1 did, guards excepted. Signals that 0.1 did not record stay absent.
     Up to schema 1 the name of a configuration decided which published numbers its runs were compared with. Up to schema
-    6 there were fields that are gone (`annelid.config.REPLACED`); a run in which one acted says so among its warnings.
+    6 there were fields that are gone (`annelid.config.checking.GONE`); a run in which one acted says so among its
+    warnings, and is not continued.
     """
     if data.attrs.get(SCHEMA, 0) < 1:
         added = {WARNINGS: ((), ""), CPU_TIME: ((), 0.0)}
@@ -160,25 +165,22 @@ def _with_published(config: str) -> str:
 
 
 def _without_gone_fields(data: xarray.Dataset) -> xarray.Dataset:
-    warnings = []
     try:
-        tree = parse_json(data.attrs["config"], "the configuration")
-        for path, instead in REPLACED.items():
-            *sections, field = path.split(".")
-            section = reduce(lambda part, name: part.get(name) or {}, sections, tree)
-            if field not in section or has_field(path, tree):
-                continue
-            value = section.pop(field)
-            acted = value and value != CONSTANT.get(path)
-            if acted and (field != "pin_inertance_kg" or section.get("pins") == "separate"):
-                warnings.append(f"{path} was {value}, a field that is gone ({instead}): its command does not repeat it")
+        tree, acted = present_fields(parse_json(data.attrs["config"], "the configuration"))
+        for path in acted:
+            *above, leaf = path.split(".")
+            del reduce(getitem, above, tree)[leaf]
         if tree["body"].get("strands", {}).get("damping_time_s", 0.0) is None:
             del tree["body"]["strands"]["damping_time_s"]
-    except (UnreadableText, KeyError, TypeError, AttributeError):
+    except (UnreadableText, KeyError, TypeError, ValueError, AttributeError):
         return data  # What is wrong with it, its reader says.
-    if warnings:
-        said = [str(data[WARNINGS].values), *sorted(warnings)]
-        data = data.assign({WARNINGS: ((), "\n".join(filter(None, said)))})
+    if acted:
+        told = (
+            f"{path} was {value}, a field that is gone ({GONE[path][0]}): its command does not repeat it"
+            for path, value in sorted(acted.items())
+        )
+        data = data.assign({WARNINGS: ((), "\n".join(filter(None, (str(data[WARNINGS].values), *told))))})
+        data = data.assign_attrs({ACTED: ", ".join(sorted(acted))})
     return data.assign_attrs(config=json.dumps(tree))
 
 
@@ -219,6 +221,16 @@ def read_config(path: str | Path) -> RunConfig:
     file = examined_file(path)[0]
     with _dataset(file) as dataset:
         return _config(file, dataset.attrs)
+
+
+def refuse_gone_numerics(path: str | Path) -> None:
+    """Raises `RunFileError` where a field acted in a run that is gone, since nothing computes such a worm any more."""
+    file = examined_file(path)[0]
+    with _dataset(file) as dataset:
+        if acted := dataset.attrs.get(ACTED):
+            raise RunFileError(
+                f"{file} cannot be continued: {acted} acted in it, and is no field any more; run it anew"
+            )
 
 
 def read_checkpoint(path: str | Path) -> Checkpoint:

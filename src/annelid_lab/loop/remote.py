@@ -82,7 +82,7 @@ class PacedPlant(ABC):
             while not self._sensed:
                 self._move(self.command)
         except SimulationStopped as stop:
-            raise ConfigError(f"the robot does not begin: {stop}") from None
+            raise ConfigError(f"the loop cannot start, since the robot did not answer: {stop}") from None
         self._is_new = True
         return self._sensation()
 

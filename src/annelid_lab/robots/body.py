@@ -75,7 +75,7 @@ class MjcfBody(BodyKind):
         """
         xml = read_mjcf(path, ROBOT, write_out)
         step_s = stated_in(xml, ROBOT, "option", "timestep")
-        clock = {} if step_s is None else {"clock": {"physics_timestep_s": float(step_s)}}
+        clock = {} if step_s is None else {"clock": {"physics_timestep_s": step_s}}
         return {"body": {"kind": "mjcf", "xml": xml}, **clock}
 
     @property

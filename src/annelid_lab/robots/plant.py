@@ -161,7 +161,7 @@ class MjcfPlant(SavedAndRecorded):
         ):
             # Written so that NaN fails it.
             if not value <= limit:
-                return f"{words} is {value:.3g} {unit}, above the limit {field} = {limit:g}"
+                return f"{words} is {value:.3g} {unit}, above the limit {field} = {limit:g} {unit}"
         return None
 
     def recordable(self) -> Recordable:

@@ -131,7 +131,7 @@ class ClosedLoop:
         if len(self.labels) > MOST_STATES:
             raise ConfigError(
                 f"{type(plant).__name__} and {type(controller).__name__} have {len(self.labels)} continuous states; "
-                f"the monodromy by finite differences takes at most {MOST_STATES}: choose a planar body"
+                f"the monodromy by finite differences takes at most {MOST_STATES}: choose fewer segments"
             )
 
     def present(self) -> tuple[Array, Switches]:

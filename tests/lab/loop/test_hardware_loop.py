@@ -32,7 +32,7 @@ from annelid_lab.loop.session import Pace
 
 COMPILER = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler called cc")
 WIRING = Wiring()
-ARM = Path(__file__).parents[2] / "benchmarks" / "arm"
+ARM = Path(__file__).parents[3] / "benchmarks" / "arm"
 
 
 def test_every_missed_deadline_counts() -> None:

@@ -31,7 +31,6 @@ __all__ = [
     "State",
     "Stateful",
     "Steering",
-    "SteeringCode",
     "Stoppable",
     "StridingController",
     "Values",
@@ -287,31 +286,14 @@ class SavedAndRecorded:
         return {}
 
 
-@dataclass(frozen=True, slots=True)
-class SteeringCode:
-    """A step of a steering as C99.
-
-    The statements may use the type ``real``, the integers ``i`` and ``j``, the counts ``N_SEGMENTS`` and ``N_MUSCLES``,
-    ``sensors->NAME`` of what is sensed, ``now.NAME`` of the state (``now.potential_mV``, ``now.n_steps`` and those
-    below), the constants, ``clipped(value, low, high)`` and ``EXP``, ``FMOD`` and ``ATAN2``.
+class Steering(SavedAndRecorded, ABC):
+    """What is left of the activation of the two halves of every ring, at every control step.
 
     Attributes:
-        statements: What multiplies ``activation->activation[]``.
-        senses: What it is given, names in `annelid.control.SENSED`.
-        constants: Numbers and arrays by name.
-        state: Initial values of its variables.
-        helpers: Functions that the statements call.
+        senses: What it senses, names in `annelid.control.SENSED`.
     """
 
-    statements: str = ""
     senses: tuple[str, ...] = ()
-    constants: Mapping[str, Any] = field(default_factory=dict)
-    state: Mapping[str, Any] = field(default_factory=dict)
-    helpers: str = ""
-
-
-class Steering(SavedAndRecorded, ABC):
-    """What is left of the activation of the two halves of every ring, at every control step."""
 
     @abstractmethod
     def reset(self) -> None:
@@ -324,7 +306,3 @@ class Steering(SavedAndRecorded, ABC):
         Returns:
             What is left afterwards, in [0, 1], ``(n_segments, 2)``: left and right half.
         """
-
-    @abstractmethod
-    def code(self) -> SteeringCode:
-        """Returns a step as C."""

@@ -1,4 +1,4 @@
-"""A network as LEMS, the language that NeuroML 2 is defined in, and back.
+"""A network as LEMS, the language that NeuroML 2 is defined in.
 
 The file has one component type, whose equations are those of `annelid.nervous`, and one component with the numbers:
 its attributes are the fields of the network's TOML text, ``neuron_1_capacitance_nF="5.0nF"``. It includes no other
@@ -10,18 +10,11 @@ from __future__ import annotations
 import re
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import zip_longest
-from pathlib import Path
 from typing import Any
 
-from annelid.errors import ConfigError, require_finite, require_positive, shortened, shown
-from annelid.nervous import Network, network_of_tables, network_tables
-from annelid.text import printable
-from annelid.textfiles import parse_xml, read_bytes
+from annelid.errors import ConfigError, require_finite, require_positive, shown
+from annelid.nervous import Network, network_tables
 
-WHAT = "a LEMS file of a network"
-MOST_ELEMENTS, MOST_LEVELS = 200_000, 8
-"""A network of 200 segments has 32,000 elements in five levels, 4 MB."""
 DIMENSIONS = {
     "per_mV": ("per_voltage", {"m": "-1", "l": "-2", "t": "3", "i": "1"}, "3"),
     "mV": ("voltage", {"m": "1", "l": "2", "t": "-3", "i": "-1"}, "-3"),
@@ -31,7 +24,6 @@ DIMENSIONS = {
     "ms": ("time", {"t": "1"}, "-3"),
 }
 """Dimension of every unit with which a field may end, its exponents, and the unit's power of ten."""
-LONGEST_NUMBER = 100
 TYPE, INPUT_CURRENT = "annelid_network", "current_nA"
 _SIMULATION = f"""<Lems>
 <ComponentType name="OutputColumn">
@@ -51,26 +43,8 @@ _SIMULATION = f"""<Lems>
   <Simulation><Run component="target" variable="t" increment="step" total="length"/></Simulation>
 </ComponentType>
 </Lems>"""
-_FLAGS = {"true": True, "false": False}
-_TEXTS = {"name", "source", "target", "kind", "targets"}
-_KEY = re.compile(r"(neuron|connection|input|output|channels|gates|targets)_([1-9]\d{0,6})(?:_(.+))?")
-_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 _IN_XML = re.compile("[\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]*")
 """Characters that XML 1.0 can hold."""
-
-
-def read_lems(path: str | Path) -> Network:
-    """Reads a network from a file of the text that `lems_text` makes; numbers and names may be others, not equations.
-
-    Currents of inputs and the simulation are no part of a network, and are left.
-
-    Raises:
-        ConfigError: The file cannot be read, is too large, includes others, or has other components or equations.
-    """
-    try:
-        return _read(parse_xml(read_bytes(Path(path), WHAT), WHAT, MOST_ELEMENTS, MOST_LEVELS))
-    except ConfigError as error:
-        raise ConfigError(f"{path}: {error}") from None
 
 
 def lems_text(
@@ -81,7 +55,7 @@ def lems_text(
     duration_ms: float = 1000.0,
     output: str = "potentials.dat",
 ) -> str:
-    """Returns a network as LEMS text, of which `read_lems` makes the same network to the last bit.
+    """Returns a network as LEMS text, with every number to the last bit.
 
     It has a simulation that writes all potentials (V) over time (s) into a file.
 
@@ -126,38 +100,6 @@ def lems_text(
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
 
 
-def _read(root: ET.Element) -> Network:
-    if root.tag != "Lems":
-        raise ConfigError(f"begins with <{shortened(printable(root.tag))}>: a LEMS file begins with <Lems>")
-    if any(each.tag == "Include" for each in root.iter()):
-        raise ConfigError("includes another file (<Include ..>), and no file that it names is read")
-    components = [each for each in root if each.tag == "Component" and each.get("type") != "Simulation"]
-    if len(components) != 1 or components[0].get("type") != TYPE or len(components[0]):
-        types = {each.get("type", each.tag) for component in components for each in component.iter()}
-        raise ConfigError(
-            f"must have one component beside its simulation, of the type {TYPE} as annelid writes it, but has "
-            f"{shortened(printable(', '.join(sorted(types)))) or 'none'}: equations of other types would be lost"
-        )
-    network = network_of_tables(_tables(components[0]), Network)
-    expected = parse_xml(lems_text(network), WHAT, MOST_ELEMENTS, MOST_LEVELS)
-    for ours, theirs in zip_longest(_definitions(expected), _definitions(root), fillvalue=("",)):
-        if ours != theirs:
-            raise ConfigError(
-                f"<{shortened(printable(theirs[0] or ours[0]))} ..> is not what annelid writes for these neurons and "
-                "connections: other equations and units cannot be read, and would be lost"
-            )
-    return network
-
-
-def _definitions(root: ET.Element) -> Iterator[tuple[Any, ...]]:
-    """All of a file but its components and target, as values that can be compared."""
-
-    def plain(element: ET.Element) -> tuple[Any, ...]:
-        return element.tag, element.attrib, [plain(child) for child in element]
-
-    return (plain(each) for each in root if each.tag not in ("Component", "Target"))
-
-
 def _flat(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
     """Every number, flag and text of nested tables by a name that is made of the keys, lists counted from 1."""
     for key, value in tree.items():
@@ -173,42 +115,6 @@ def _flat(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]
             yield prefix + key, value
 
 
-def _tables(component: ET.Element) -> dict[str, Any]:
-    """The tables that `_flat` took apart."""
-    tables: dict[str, Any] = {"name": component.get("name", "network")}
-    for name, text in component.attrib.items():
-        if name in ("id", "type", "name"):
-            continue
-        level, rest = tables, name
-        try:
-            while (found := _KEY.fullmatch(rest)) is not None and found[3] is not None:
-                level, rest = level.setdefault(found[1], {}).setdefault(int(found[2]), {}), found[3]
-            if found is not None:
-                level.setdefault(found[1], {})[int(found[2])] = text
-                continue
-            level[rest] = _value(rest, text, name)
-        except (AttributeError, TypeError):
-            raise ConfigError(f"attribute {shown(name)} of the network is none that annelid writes") from None
-    for entry in tables.get("input", {}).values():
-        if isinstance(entry, dict):
-            entry.pop(INPUT_CURRENT, None)
-            entry.setdefault("targets", {})
-    return _listed(tables)
-
-
-def _listed(tree: Any) -> Any:
-    """Makes lists of what is numbered from 1 without gaps."""
-    if not isinstance(tree, dict):
-        return tree
-    if all(isinstance(key, int) for key in tree):
-        if sorted(tree) != list(range(1, len(tree) + 1)):
-            raise ConfigError(
-                f"has parts numbered {', '.join(map(str, sorted(tree)[:9]))}: from 1, none may be missing"
-            )
-        return [_listed(tree[key]) for key in sorted(tree)]
-    return {key: _listed(value) for key, value in tree.items()}
-
-
 def _unit(key: str) -> str:
     """The unit with which a field's name ends, "" for a plain number."""
     return next((unit for unit in DIMENSIONS if key.endswith(f"_{unit}")), "")
@@ -218,20 +124,6 @@ def _text(value: Any, unit: str) -> str:
     if isinstance(value, str):
         return value
     return str(value).lower() if isinstance(value, bool) else f"{float(value)!r}{unit}"
-
-
-def _value(field: str, text: str, place: str) -> Any:
-    if field in _TEXTS:
-        return text
-    if field == "rectified":
-        return _FLAGS.get(text, text)
-    unit = _unit(field)
-    number = text.strip().removesuffix(unit).strip()
-    if len(number) > LONGEST_NUMBER or not _NUMBER.fullmatch(number) or (unit and not text.strip().endswith(unit)):
-        raise ConfigError(
-            f"{shortened(printable(place))} = {shown(text)}: must be a number" + (f" in {unit}" if unit else "")
-        )
-    return float(number)
 
 
 def _type(network: Network, fields: Mapping[str, Any]) -> ET.Element:

@@ -32,7 +32,6 @@ ARM = pytest.mark.skipif(
     not (shutil.which("arm-none-eabi-gcc") and shutil.which("qemu-system-arm")),
     reason="gcc-arm-none-eabi or qemu-system-arm is not installed",
 )
-WAYPOINTS = [[-1.0, 0.1], [-2.0, 1.0]]
 WORMS: dict[str, tuple[str, dict[str, Any]]] = {
     "sns": ("riddle2023-rods", {"controller": {"kind": "sns"}}),
     "linear": ("riddle2022-planar", {}),
@@ -41,13 +40,7 @@ WORMS: dict[str, tuple[str, dict[str, Any]]] = {
     "waiting": ("riddle2023-rods", {"controller": {"kind": "sns-waiting"}}),
     "robust": ("riddle2023-rods", {"controller": {"kind": "sns-robust"}}),
     "driven": ("riddle2025-adaptive", {}),
-    "constant": ("riddle2025-3x1", {"controller": {"kind": "sns"}, "turning.modulation": -0.6}),
-    "heading": ("riddle2025-steered", {"controller": {"kind": "sns-robust"}}),
-    "course": (
-        "riddle2025-3x1",
-        {"controller": {"kind": "sns"}, "turning": {"kind": "course", "waypoints": WAYPOINTS}},
-    ),
-    "touch": ("riddle2025-3x1", {"controller": {"kind": "sns-robust"}, "turning": {"kind": "touch"}}),
+    "halves": ("riddle2025-muscles", {"body.rings.layout": "halves"}),
     "own": ("riddle2023-rods", {"controller": {"kind": "baton"}}),
 }
 OWN = ROOT / "examples" / "extend" / "own_circuit.py"
@@ -119,7 +112,7 @@ def test_a_network_gives_the_same_bits_where_sums_are_in_the_same_order(
 
 
 @COMPILER
-@pytest.mark.parametrize(("worm", "real"), [("linear", "double"), ("pressure", "float"), ("touch", "float")])
+@pytest.mark.parametrize(("worm", "real"), [("linear", "double"), ("pressure", "float"), ("halves", "float")])
 def test_a_controller_passes_its_self_test(worm: str, real: Any, tmp_path: Path) -> None:
     done = compiled_self_test(controller_firmware(controller_of(worm), worm, real=real), tmp_path)
     assert done.returncode == 0, done.stdout
@@ -196,6 +189,8 @@ def test_numbers_too_large_for_float_and_controllers_without_a_network_are_refus
         network_firmware(network, real="float")
     with pytest.raises(ConfigError, match="only controllers that step a network"):
         controller_firmware(annelid.build_controller(*_built("riddle2025-3x1")))
+    with pytest.raises(ConfigError, match="turning is not written as C"):
+        controller_firmware(annelid.build_controller(*_built("riddle2025-steered")))
 
 
 def _built(preset: str) -> Any:

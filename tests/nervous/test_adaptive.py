@@ -8,19 +8,24 @@ import numpy as np
 import pytest
 
 from annelid.nervous import (
+    Network,
     PeristalsisParameters,
-    adaptive_half_centre,
     adaptive_peristalsis_network,
+    add_half_centre,
     drive_conductance_uS,
     peristalsis_network,
 )
+from annelid.nervous.peristalsis import add_drive
 
 PAPER = PeristalsisParameters()
 
 
 def periods_ms(parameters: PeristalsisParameters, drives: np.ndarray, timestep_ms: float, seconds: float):
     """Mean and spread of the period of free half-centres side by side, each at its drive, ms."""
-    stepper = adaptive_half_centre(parameters).compile(timestep_ms, "heun", len(drives))
+    network = Network()
+    add_half_centre(network, "first", "second", parameters)
+    add_drive(network, parameters, ("first", "second"), drive_conductance_uS(parameters), 5.0)
+    stepper = network.compile(timestep_ms, "heun", len(drives))
     current = drives[:, np.newaxis] * parameters.leak_conductance_uS * parameters.range_mV
     trace = stepper.run(np.broadcast_to(current, (round(1e3 * seconds / timestep_ms), *current.shape)))
     difference = trace[..., 0] - trace[..., 1]

@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from annelid.errors import ConfigError
-from annelid.nervous import transmission
 from annelid.nervous.robust import (
     DISCHARGE,
     ROLES,
@@ -44,7 +43,7 @@ def driven_turn_ms(
     flip comes on top.
     """
     p = RobustParameters() if parameters is None else parameters
-    extra = drive * transmission(lift, p.signals).conductance_uS
+    extra = drive * p.transmission(lift).conductance_uS
     leak, charge, excitatory, threshold = p.leak_conductance_uS, p.charge_uS, p.excitatory_reversal_mV, yield_mV(p)
     undriven_ms = log(p.range_mV / (p.range_mV - threshold))
     capacitance = p.turn_ms / undriven_ms * (leak + charge)

@@ -54,6 +54,20 @@ def test_gate_start_steady_and_toolbox():
     np.testing.assert_allclose(reversed_slope, 1 / (1 + 0.5 * np.exp(-0.05 * u)), rtol=1e-14)
 
 
+def test_stable_timestep_is_where_euler_begins_to_grow() -> None:
+    network = Network()
+    network.add_neuron("shunting", Neuron(bias_nA=20.0), 20.0)
+    network.add_neuron("shunted", Neuron(bias_nA=20.0))
+    network.add_synapse("shunting", "shunted", Synapse(19.0, 0.0))
+
+    def last(factor: float) -> float:
+        return network.compile(factor * network.stable_timestep_ms()).run(np.empty((400, 0)))[-1, 0, 1]
+
+    assert network.stable_timestep_ms() == pytest.approx(0.5)
+    assert last(0.98) == pytest.approx(1.0, abs=0.01)
+    assert abs(last(1.05) - 1.0) > 1.0
+
+
 def test_impossible_properties_are_refused_by_name(subtests: pytest.Subtests) -> None:
     for make, field in (
         (lambda: Neuron(capacitance_nF=0.0), "capacitance_nF"),

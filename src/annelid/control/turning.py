@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from dataclasses import replace
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -28,7 +27,6 @@ from annelid.protocols import (
     Sensation,
     Stateful,
     Steering,
-    SteeringCode,
     StridingController,
     Values,
 )
@@ -50,16 +48,6 @@ def wrapped(angle_rad: float) -> float:
     return (angle_rad + math.pi) % (2.0 * math.pi) - math.pi
 
 
-_WRAPPED = """
-static real wrapped(real angle)
-{
-    real rest = FMOD(angle + pi, 2 * pi);
-    if (rest < 0) rest += 2 * pi;
-    return rest - pi;
-}
-"""
-
-
 def half_scales(modulation: ArrayLike) -> Array:
     """Returns what modulations m in [-1, 1] leave of the left and the right activation, shape ``(.., 2)``."""
     m = np.asarray(modulation, dtype=float)
@@ -67,7 +55,13 @@ def half_scales(modulation: ArrayLike) -> Array:
 
 
 class SteeringKind(TurningKind):
-    """A turning by a rule that changes a state of its own at every control step."""
+    """A turning by a rule that changes a state of its own at every control step.
+
+    Attributes:
+        senses: What it senses, names in `annelid.control.SENSED`.
+    """
+
+    senses: ClassVar[tuple[str, ...]] = ()
 
     def build(self, n_segments: int, control_timestep_s: float) -> Steering:
         """Builds the steering, as `TurningKind.build`."""
@@ -84,10 +78,6 @@ class SteeringKind(TurningKind):
     @abstractmethod
     def _scales(self, now: Now, n_segments: int) -> Array:
         """What is left of the activation of each half, in [0, 1], ``(n_segments, 2)``."""
-
-    @abstractmethod
-    def _code(self, timestep_s: float, n_segments: int) -> SteeringCode:
-        """Both of these as C."""
 
 
 class Descending(SteeringKind):
@@ -126,33 +116,6 @@ class Descending(SteeringKind):
     def _scales(self, now: Now, n_segments: int) -> Array:
         return half_scales(float(now["modulation"]) * np.array(self.shares or [1.0] * n_segments))
 
-    @abstractmethod
-    def _wanted_code(self, timestep_s: float) -> SteeringCode:
-        """What sets ``wanted`` as C, as `_code`."""
-
-    def _code(self, timestep_s: float, n_segments: int) -> SteeringCode:
-        wanted = self._wanted_code(timestep_s)
-        statements = f"""
-    {{
-        real wanted = 0;{wanted.statements}
-        now.modulation = wanted + (now.modulation - wanted) * keeps;
-        for (i = 0; i < N_SEGMENTS; i++) {{
-            const real m = now.modulation * share_of_modulation[i];
-            activation->activation[2 * i] *= 1 - (m > 0 ? m : 0);
-            activation->activation[2 * i + 1] *= 1 - (-m > 0 ? -m : 0);
-        }}
-    }}"""
-        constants = {
-            "keeps": math.exp(-timestep_s / self.descending_time_constant_s),
-            "share_of_modulation": np.array(self.shares or [1.0] * n_segments, dtype=float),
-        }
-        return replace(
-            wanted,
-            statements=statements,
-            constants={**constants, **wanted.constants},
-            state={"modulation": 0.0, **wanted.state},
-        )
-
 
 class ConstantTurning(Descending):
     """A constant modulation: the worm crawls in a circle."""
@@ -163,9 +126,6 @@ class ConstantTurning(Descending):
     def _wanted(self, now: Now, sensation: Sensation, timestep_s: float) -> float:
         return self.modulation
 
-    def _wanted_code(self, timestep_s: float) -> SteeringCode:
-        return SteeringCode("\n        wanted = wanted_modulation;", constants={"wanted_modulation": self.modulation})
-
 
 class Steered(Descending):
     """Proportional and derivative control of the heading, whose output is the wanted modulation.
@@ -174,6 +134,7 @@ class Steered(Descending):
     it, over the filter's time constant: it averages over the swings of a cycle.
     """
 
+    senses: ClassVar[tuple[str, ...]] = ("heading_rad",)
     gain_per_rad: NonNegative = Field(default=3.0, description="modulation per error of the heading")
     rate_gain_s: NonNegative = Field(default=1.0, description="modulation taken off per rate of the heading, s per rad")
     rate_time_constant_s: Positive = Field(default=2.0, description="of the rate's filter; about one cycle")
@@ -205,34 +166,6 @@ class Steered(Descending):
         modulation = self.gain_per_rad * wrapped(target - angle) - self.rate_gain_s * rate
         return min(max(modulation, -self.largest_modulation), self.largest_modulation)
 
-    @abstractmethod
-    def _target_code(self) -> SteeringCode:
-        """What sets ``target``, and ``wanted`` to 1 if there is one, as C, as `_code`."""
-
-    def _wanted_code(self, timestep_s: float) -> SteeringCode:
-        target = self._target_code()
-        statements = f"""
-        real target = 0, rate;
-        const real heading = sensors->heading_rad[0];
-        if (now.n_steps == 0)
-            for (i = 0; i < 3; i++) now.headings[i] = heading;
-        now.headings[1] += wrapped(heading - now.headings[1]);
-        rate = (now.headings[1] - now.headings[2]) / rate_time_constant_s;
-        now.headings[2] += rate_share * (now.headings[1] - now.headings[2]);{target.statements}
-        if (wanted > 0)
-            wanted = clipped(
-                gain_per_rad * wrapped(target - now.headings[1]) - rate_gain_s * rate,
-                -largest_modulation, largest_modulation);"""
-        own = self.model_dump(include={"gain_per_rad", "rate_gain_s", "rate_time_constant_s", "largest_modulation"})
-        constants = {"pi": math.pi, "rate_share": -math.expm1(-timestep_s / self.rate_time_constant_s), **own}
-        return SteeringCode(
-            statements,
-            ("heading_rad", *target.senses),
-            {**constants, **target.constants},
-            {"headings": np.zeros(3), **target.state},
-            _WRAPPED,
-        )
-
 
 class HeadingTurning(Steered):
     """Steering to a heading: the direction from the last ring to the foremost."""
@@ -245,14 +178,11 @@ class HeadingTurning(Steered):
     def _target(self, now: Now, sensation: Sensation) -> float:
         return float(now["headings"][0]) + math.radians(self.heading_deg)
 
-    def _target_code(self) -> SteeringCode:
-        statements = "\n        target = now.headings[0] + heading_rad;\n        wanted = 1;"
-        return SteeringCode(statements, constants={"heading_rad": math.radians(self.heading_deg)})
-
 
 class CourseTurning(Steered):
     """Steering to one waypoint after another; behind the last one the worm crawls on unsteered."""
 
+    senses: ClassVar[tuple[str, ...]] = ("heading_rad", "front_m")
     kind: Literal["course"] = "course"
     waypoints: tuple[Waypoint, ...] = Field(
         min_length=1,
@@ -277,20 +207,6 @@ class CourseTurning(Steered):
             now["n_reached"] += 1
         return None
 
-    def _target_code(self) -> SteeringCode:
-        statements = f"""
-        for (; now.n_reached < {len(self.waypoints)}; now.n_reached++) {{
-            const real *waypoint = waypoints_m[(int)now.n_reached];
-            const real x = waypoint[0] - sensors->front_m[0], y = waypoint[1] - sensors->front_m[1];
-            if (x * x + y * y > reach_m * reach_m) {{
-                target = ATAN2(-y, -x);
-                wanted = 1;
-                break;
-            }}
-        }}"""
-        constants = {"waypoints_m": np.array(self.waypoints, dtype=float), "reach_m": self.reach_m}
-        return SteeringCode(statements, ("front_m",), constants, {"n_reached": 0.0})
-
 
 class TouchTurning(SteeringKind):
     """Turning away from contact, as the authors published it.
@@ -302,6 +218,7 @@ class TouchTurning(SteeringKind):
     """
 
     cites = (("riddle2025models", "turning away from contact"),)
+    senses: ClassVar[tuple[str, ...]] = ("touch_N",)
     kind: Literal["touch"] = "touch"
 
     def _at_start(self) -> Now:
@@ -326,37 +243,6 @@ class TouchTurning(SteeringKind):
     def _scales(self, now: Now, n_segments: int) -> Array:
         return np.tile(now["scales"], (n_segments, 1))
 
-    def _code(self, timestep_s: float, n_segments: int) -> SteeringCode:
-        statements = f"""
-    {{
-        const real difference_N = sensors->touch_N[0][{RIGHT}] - sensors->touch_N[0][{LEFT}];
-        const real size_N = difference_N < 0 ? -difference_N : difference_N;
-        if (now.timer_s <= slack_s) {{
-            now.latched[0] = now.latched[1] = 1;
-            now.timer_s = size_N > touch_starts_N ? turning_s : 0;
-        }}
-        if (now.timer_s > slack_s) {{
-            real *away = &now.latched[difference_N > 0 ? 0 : 1];
-            if (size_N >= touch_least_N) *away = clipped((touch_full_N - size_N) / touch_full_N, 0, *away);
-            now.timer_s -= step_s;
-        }}
-        for (j = 0; j < 2; j++) {{
-            now.half_scale[j] += clipped(now.latched[j] - now.half_scale[j], -scale_reach, scale_reach);
-            for (i = 0; i < N_SEGMENTS; i++) activation->activation[2 * i + j] *= now.half_scale[j];
-        }}
-    }}"""
-        constants = {
-            "slack_s": SLACK_S,
-            "touch_starts_N": TOUCH_STARTS_N,
-            "turning_s": TOUCH_HOLD_S,
-            "touch_least_N": TOUCH_LEAST_N,
-            "touch_full_N": TOUCH_FULL_N,
-            "step_s": timestep_s,
-            "scale_reach": SCALE_RATE_PER_S * timestep_s,
-        }
-        state = {"timer_s": 0.0, "latched": np.ones(2), "half_scale": np.ones(2)}
-        return SteeringCode(statements, ("touch_N",), constants, state)
-
 
 class RuleSteering(Steering):
     """A steering by the rule of its section of the configuration."""
@@ -366,6 +252,7 @@ class RuleSteering(Steering):
     def __init__(self, rule: SteeringKind, n_segments: int, control_timestep_s: float) -> None:
         """Begins with all halves whole."""
         self._rule, self._n_segments, self._timestep_s = rule, n_segments, control_timestep_s
+        self.senses = rule.senses
         self.reset()
 
     def reset(self) -> None:
@@ -377,10 +264,6 @@ class RuleSteering(Steering):
         for _ in range(n_steps):
             self._rule._advance(self._now, sensation, self._timestep_s)
         return self.scales()
-
-    def code(self) -> SteeringCode:
-        """Returns a step as C, as `Steering.code`."""
-        return self._rule._code(self._timestep_s, self._n_segments)
 
     def scales(self) -> Array:
         """Returns the scales after the latest step, in [0, 1], ``(n_segments, 2)``: left and right half."""
@@ -399,8 +282,7 @@ class RuleSteering(Steering):
 class TurningController(SavedWrapper):
     """A controller whose pattern another one makes, and whose sides a steering scales.
 
-    The pattern senses that it is scaled only through the body: its rhythm is its own. Its rules count time, follow a
-    course and act on the activation, so they are no rows of senses of a `Circuit`: each is written in C, too.
+    The pattern senses that it is scaled only through the body: its rhythm is its own.
 
     Raises:
         ConfigError: Whole rings, or a pattern whose state cannot be saved.
@@ -424,7 +306,7 @@ class TurningController(SavedWrapper):
     def senses(self) -> tuple[str, ...]:
         """What it senses, names in `annelid.control.SENSED`."""
         pattern = getattr(self.inner, "senses", ("lengthening_m",))
-        return tuple(dict.fromkeys((*pattern, *self.between.code().senses)))
+        return tuple(dict.fromkeys((*pattern, *self.between.senses)))
 
     def reset(self, seed: int) -> None:
         """Returns to the initial state; ``seed`` is the pattern's."""

@@ -2,25 +2,7 @@
 
 from annelid.lazy import lazy
 from annelid.nervous.arrays import NO_GATE, NetworkArrays
-from annelid.nervous.functional_subnetworks import (
-    Signals,
-    addition,
-    differentiation,
-    division,
-    integration,
-    multiplication,
-    subtraction,
-    transmission,
-)
-from annelid.nervous.half_centre import (
-    HalfCentre,
-    add_half_centre,
-    add_hold,
-    find_period,
-    half_centre_network,
-    half_centre_of_period,
-    oscillation_periods,
-)
+from annelid.nervous.half_centre import HalfCentre, add_half_centre, add_hold
 from annelid.nervous.network import Network
 from annelid.nervous.neurons import (
     Channel,
@@ -34,14 +16,13 @@ from annelid.nervous.neurons import (
 from annelid.nervous.peristalsis import (
     Conductances,
     PeristalsisParameters,
-    adaptive_half_centre,
     adaptive_peristalsis_network,
     drive_conductance_uS,
     neuron_names,
     peristalsis_network,
 )
 from annelid.nervous.stepper import GateStart, NetworkState, Scheme, Stepper
-from annelid.nervous.toml import network_of_tables, network_tables
+from annelid.nervous.toml import network_tables
 from annelid.nervous.wiring import Connection
 
 __all__ = [
@@ -60,33 +41,24 @@ __all__ = [
     "Neuron",
     "PeristalsisParameters",
     "Scheme",
-    "Signals",
     "Stepper",
     "Synapse",
-    "adaptive_half_centre",
     "adaptive_peristalsis_network",
     "add_half_centre",
     "add_hold",
-    "addition",
-    "differentiation",
-    "division",
     "drive_conductance_uS",
-    "find_period",
-    "half_centre_network",
-    "half_centre_of_period",
-    "integration",
-    "multiplication",
-    "network_of_tables",
     "network_tables",
     "neuron_names",
-    "oscillation_periods",
     "peristalsis_network",
     "persistent_sodium",
-    "subtraction",
-    "transmission",
 ]
 _SPIKES = "neurons are graded: use a Synapse"
 _MODULATION = "nothing is modulated: excite or inhibit by a Synapse"
+_ARITHMETIC = (
+    "SNS-Toolbox has such networks (sns_toolbox.networks), and annelid_lab.sns_toolbox.import_network takes them"
+)
+_PERIODS = "build one by add_half_centre, and vary gate_time_constant_ms"
+_SIGNALS = "HalfCentre has the range, the reversal potentials and transmission(gain)"
 __getattr__, __dir__ = lazy(
     __name__,
     {
@@ -96,6 +68,11 @@ __getattr__, __dir__ = lazy(
         "Factors": _MODULATION,
         "Modulated": _MODULATION,
         "ModulatorySynapse": _MODULATION,
+        **dict.fromkeys(
+            ("addition", "subtraction", "division", "multiplication", "differentiation", "integration"), _ARITHMETIC
+        ),
+        **dict.fromkeys(("half_centre_of_period", "oscillation_periods", "find_period"), _PERIODS),
+        **dict.fromkeys(("Signals", "transmission"), _SIGNALS),
     },
     ("annelid_studies.oscillators", "annelid_lab.sns_toolbox"),
 )

@@ -1,4 +1,4 @@
-"""Half-centres: two neurons that inhibit each other and take turns, designed for a wanted period.
+"""Half-centres: two neurons that inhibit each other and take turns, designed by where they rest.
 
 Each neuron bears a persistent sodium channel that keeps it at the operating range R once it is up, until the partner
 escapes from its inhibition. Whether it does is set by the bifurcation parameter delta, and how long it takes mostly by
@@ -14,22 +14,11 @@ the sodium current (Riddle et al. 2022).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from contextlib import suppress
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 
-import numpy as np
-
-from annelid.errors import ConfigError, require_negative, require_positive, suggest
-from annelid.nervous.functional_subnetworks import Signals
+from annelid.errors import ConfigError, require_negative, require_positive
 from annelid.nervous.network import Network
-from annelid.nervous.neurons import Array, Channel, Neuron, Synapse, persistent_sodium
-
-_TIMESTEP_MS = 1.0
-_CANDIDATES = 9
-_MAX_ROUNDS = 12
-# A neuron that has not escaped within this many gate time constants is taken never to escape.
-_PATIENCE = 40.0
+from annelid.nervous.neurons import Channel, Neuron, Synapse, persistent_sodium
 
 
 @dataclass(frozen=True)
@@ -129,12 +118,6 @@ class HalfCentre:
         return -drive_uS * driver_mV / self.range_mV * self.excitatory_reversal_mV / self.inhibitory_reversal_mV
 
     @property
-    def signals(self) -> Signals:
-        """How neurons outside the half-centres carry signals."""
-        membrane = self.range_mV, self.leak_conductance_uS, self.capacitance_nF
-        return Signals(*membrane, self.excitatory_reversal_mV, self.inhibitory_reversal_mV)
-
-    @property
     def sodium_channel(self) -> Channel:
         """The persistent sodium channel of both neurons."""
         return self._channel(self.sodium_uS)
@@ -144,13 +127,37 @@ class HalfCentre:
         """Either of the two neurons."""
         return Neuron(self.capacitance_nF, self.leak_conductance_uS, channels=(self.sodium_channel,))
 
+    @property
+    def leaky_neuron(self) -> Neuron:
+        """A neuron outside the half-centres."""
+        return Neuron(self.capacitance_nF, self.leak_conductance_uS)
+
     def inhibitory(self, conductance_uS: float) -> Synapse:
         """Returns an inhibitory synapse that transmits between 0 and R."""
-        return self.signals.synapse(conductance_uS, self.inhibitory_reversal_mV)
+        return Synapse(conductance_uS, self.inhibitory_reversal_mV, 0.0, self.range_mV)
 
     def excitatory(self, conductance_uS: float) -> Synapse:
         """Returns an excitatory synapse that transmits between 0 and R."""
-        return self.signals.synapse(conductance_uS, self.excitatory_reversal_mV)
+        return Synapse(conductance_uS, self.excitatory_reversal_mV, 0.0, self.range_mV)
+
+    def transmission(self, gain: float = 1.0) -> Synapse:
+        """Designs the synapse that transmits ``U_post = k U_pre`` (Szczecinski, Hunt and Quinn 2017).
+
+        ``g = Gm k R / (E_ex - k R)``: exact at U_pre = 0 and R. In between ``U* = k U E / (E - k (R - U))``, too much
+        by ``k^2 U (R - U) / (E - k (R - U))``, at most about ``(k R)^2 / (4 E)``.
+
+        Args:
+            gain: k, so that k R stays below the excitatory reversal potential.
+
+        Raises:
+            ConfigError: A gain that is not positive, or too large for the reversal potential.
+        """
+        reach, greatest = gain * self.range_mV, self.excitatory_reversal_mV / self.range_mV
+        if not 0 < gain < greatest:
+            raise ConfigError(
+                f"gain must be above 0 and below excitatory_reversal_mV / range_mV = {greatest:g}, not {gain}"
+            )
+        return self.excitatory(self.leak_conductance_uS * reach / (self.excitatory_reversal_mV - reach))
 
     def _channel(self, conductance_uS: float) -> Channel:
         gate = self.gate_slope_per_mV, self.gate_time_constant_ms
@@ -202,159 +209,3 @@ def add_hold(network: Network, holder: str, down: str, up: str, half_centre: Hal
     p = half_centre or HalfCentre()
     network.add_synapse(holder, down, p.inhibitory(p.hold_down_uS))
     network.add_synapse(holder, up, p.excitatory(p.hold_up_uS))
-
-
-def half_centre_network(half_centre: HalfCentre | None = None) -> Network:
-    """Returns a network of one half-centre, neurons and outputs ``first`` and ``second``, each with an input."""
-    network = Network("half-centre")
-    add_half_centre(network, "first", "second", half_centre)
-    for name in ("first", "second"):
-        network.add_input(f"drive_{name}", name)
-        network.add_output(name, name)
-    return network
-
-
-def oscillation_periods(half_centres: Sequence[HalfCentre], duration_ms: float | None = None) -> Array:
-    """Measures the free-running periods of many half-centres at once, as one network in steps of 1 ms (Heun).
-
-    A period is the time between the last two instants at which the first neuron overtakes the second, interpolated
-    within the step; the first cycle is left out.
-
-    Args:
-        half_centres: The designs.
-        duration_ms: How long to wait at most for three such instants; default: 40 times the largest gate time
-            constant. The run ends as soon as all have had them.
-
-    Returns:
-        Periods, ms, ``(n,)``; infinite where there were fewer than three.
-
-    Raises:
-        ConfigError: A design gives a negative conductance, or there is none.
-    """
-    if not half_centres:
-        raise ConfigError("oscillation_periods needs at least one half-centre")
-    network = Network("half-centres")
-    for i, half_centre in enumerate(half_centres):
-        add_half_centre(network, f"first_{i}", f"second_{i}", half_centre)
-    if duration_ms is None:
-        duration_ms = _PATIENCE * max(p.gate_time_constant_ms for p in half_centres)
-    stepper = network.compile(_TIMESTEP_MS, "heun")
-    state = stepper.initial_state()
-    first, second = state.potential[0, ::2], state.potential[0, 1::2]
-    lead = first - second
-    instants: list[list[float]] = [[] for _ in half_centres]
-    for step in range(int(duration_ms / _TIMESTEP_MS)):
-        stepper.advance(state)
-        before, lead = lead, first - second
-        overtaken = np.flatnonzero((before < 0.0) & (lead >= 0.0))
-        for i in overtaken:
-            instants[i].append(_TIMESTEP_MS * (step + before[i] / (before[i] - lead[i])))
-        if overtaken.size and all(len(times) >= 3 for times in instants):
-            break
-    return np.array([times[-1] - times[-2] if len(times) >= 3 else np.inf for times in instants])
-
-
-def half_centre_of_period(
-    period_ms: float,
-    half_centre: HalfCentre | None = None,
-    parameter: str = "gate_time_constant_ms",
-    bounds: tuple[float, float] | None = None,
-    tolerance: float = 1e-3,
-) -> HalfCentre:
-    """Finds the value of one parameter with which a half-centre oscillates at a wanted period.
-
-    Args:
-        period_ms: The wanted period.
-        half_centre: The design whose other parameters are kept; default: that of Riddle et al. 2022.
-        parameter: Which field of `HalfCentre` to vary.
-        bounds: Least and greatest value to try; default: a tenth and ten times the present one.
-        tolerance: Relative error of the period at which to stop.
-
-    Raises:
-        ConfigError: An unknown parameter, bounds that are not in order or of one sign, or a period that cannot be had
-            within them; the sentence has the range that can.
-    """
-    base = half_centre or HalfCentre()
-    names = [field.name for field in fields(HalfCentre)]
-    if parameter not in names:
-        raise ConfigError(f"unknown parameter {parameter!r} of a half-centre: {suggest(parameter, names)}")
-    low, high = bounds or sorted((0.1 * getattr(base, parameter), 10.0 * getattr(base, parameter)))
-
-    def periods_of(values: Array, duration_ms: float | None) -> Array:
-        periods, possible = np.full(values.size, np.inf), {}
-        for i, value in enumerate(values):
-            with suppress(ConfigError):
-                candidate = replace(base, **{parameter: float(value)})
-                half_centre_network(candidate)
-                possible[i] = candidate
-        if possible:
-            periods[list(possible)] = oscillation_periods(list(possible.values()), duration_ms)
-        return periods
-
-    return replace(base, **{parameter: find_period(periods_of, period_ms, (low, high), tolerance, parameter)})
-
-
-def find_period(
-    periods_of: Callable[[Array, float | None], Array],
-    period_ms: float,
-    bounds: tuple[float, float],
-    tolerance: float = 1e-3,
-    parameter: str = "parameter",
-) -> float:
-    """Finds the value of a parameter at which something oscillates with a wanted period.
-
-    Each round measures nine values at once, evenly spaced in the logarithm, and goes on between the two neighbours
-    that have the wanted period between them: a bracket shrinks eightfold a round, and the period need not be monotone.
-
-    Args:
-        periods_of: Takes values ``(n,)`` and the longest time to simulate, ms (None: as long as it takes), and
-            returns periods, ms, ``(n,)``, infinite where there is no oscillation within that time.
-        period_ms: The wanted period.
-        bounds: Least and greatest value, both positive or both negative.
-        tolerance: Relative error of the period at which to stop.
-        parameter: What to call the parameter in an error.
-
-    Raises:
-        ConfigError: Bounds that are not in order or of one sign, a period or tolerance that is not positive, or a
-            period that is not attained; the sentence has the range that is.
-    """
-    low, high = bounds
-    if not (low < high and low * high > 0):
-        raise ConfigError(f"the bounds of {parameter} must be in ascending order and of one sign, not {bounds}")
-    if not (period_ms > 0 and np.isfinite(period_ms) and tolerance > 0):
-        raise ConfigError(f"period_ms and tolerance must be positive, not {period_ms} and {tolerance}")
-    # Slower ones need not be waited for, unless nothing else distinguishes them from silent ones.
-    patience: float | None = 5.0 * period_ms
-    values = np.geomspace(low, high, _CANDIDATES)
-    periods = periods_of(values, patience)
-    if _bracket(periods, period_ms)[1]:
-        patience = None
-        periods = periods_of(values, patience)
-    seen = np.empty(0)
-    for _ in range(_MAX_ROUNDS):
-        seen = np.append(seen, periods[np.isfinite(periods)])
-        errors = np.abs(periods / period_ms - 1.0)
-        best, (left, _) = int(np.argmin(errors)), _bracket(periods, period_ms)
-        if errors[best] <= tolerance:
-            return float(values[best])
-        if left is None:
-            break
-        values = np.geomspace(values[left], values[left + 1], _CANDIDATES)
-        periods = periods_of(values, patience)
-    if not seen.size:
-        raise ConfigError(f"nothing oscillates with {parameter} from {low:g} to {high:g}")
-    raise ConfigError(
-        f"a period of {period_ms:g} ms cannot be had with {parameter} from {low:g} to {high:g}: the periods found "
-        f"there go from {seen.min():.4g} to {seen.max():.4g} ms"
-    )
-
-
-def _bracket(periods: Array, wanted: float) -> tuple[int | None, bool]:
-    """Place i of the best pair i, i + 1 with the wanted period between them, and whether one of the pair is silent.
-
-    Pairs of two finite periods come first, then those of lower i; None, and True, where there is no pair.
-    """
-    above, silent = periods > wanted, ~np.isfinite(periods)
-    pairs = [(bool(silent[i] or silent[i + 1]), int(i)) for i in np.flatnonzero(above[:-1] != above[1:])]
-    doubtful, place = min(pairs, default=(True, None))
-    return place, doubtful

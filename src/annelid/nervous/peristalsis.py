@@ -14,7 +14,6 @@ from dataclasses import dataclass, fields
 from functools import cached_property
 
 from annelid.errors import ConfigError, require_at_least, require_positive
-from annelid.nervous.functional_subnetworks import transmission
 from annelid.nervous.half_centre import HalfCentre, add_half_centre, add_hold
 from annelid.nervous.network import Network
 from annelid.nervous.neurons import Neuron, Synapse
@@ -136,8 +135,8 @@ def _segments(name: str, n_segments: int, p: PeristalsisParameters, *, relays_jo
         contraction, expansion, sensory, relay = (f"{role}_{segment}" for role in ROLES)
         held = (-p.offset_mV, p.range_mV + p.offset_mV)
         add_half_centre(network, contraction, expansion, p, (p.range_mV, 0.0) if first else held)
-        network.add_neuron(sensory, p.signals.neuron, 0.0 if first else p.range_mV)
-        network.add_neuron(relay, p.signals.neuron, 0.0)
+        network.add_neuron(sensory, p.leaky_neuron, 0.0 if first else p.range_mV)
+        network.add_neuron(relay, p.leaky_neuron, 0.0)
         add_hold(network, sensory, down=contraction, up=expansion, half_centre=p)
         if relays_joined:
             network.add_synapse(sensory, relay, p.inhibitory(g.sensory_to_relay))
@@ -181,21 +180,6 @@ def add_drive(
     for target in targets:
         network.add_synapse(DRIVE_NEURON, target, p.excitatory(conductance_uS))
     network.add_input("drive", DRIVE_NEURON)
-
-
-def adaptive_half_centre(parameters: PeristalsisParameters | None = None) -> Network:
-    """Builds a half-centre under a descending drive, by default that of the papers.
-
-    Its neurons are ``contraction``, ``expansion`` and ``descending``. The input ``drive`` is a current into the last
-    one: ``drive Gm R`` nA keeps it at the drive. Outputs are the first two.
-    """
-    p = parameters or PeristalsisParameters()
-    network, halves = Network("half-centre under a drive"), ("contraction", "expansion")
-    add_half_centre(network, *halves, p)
-    add_drive(network, p, halves, drive_conductance_uS(p), p.capacitance_nF / p.leak_conductance_uS)
-    for half in halves:
-        network.add_output(half, half)
-    return network
 
 
 def adaptive_peristalsis_network(
@@ -255,17 +239,17 @@ def pressure_network(
     """
     require_at_least(0, hold=hold, release=release, exchange=exchange)
     p = parameters or PeristalsisParameters()
-    network, signals, leak = peristalsis_network(n_segments, p), p.signals, p.leak_conductance_uS
+    network, leak = peristalsis_network(n_segments, p), p.leak_conductance_uS
     segments = range(1, n_segments + 1)
     for segment in segments:
         network.add_neuron(f"pressure_{segment}", Neuron(pressure_ms * leak, leak))
-        network.add_neuron(f"extension_{segment}", signals.neuron)
+        network.add_neuron(f"extension_{segment}", p.leaky_neuron)
     for segment in segments:
         two_before = (segment - 3) % n_segments + 1
         if hold > 0:
-            network.add_synapse(f"pressure_{segment}", f"sensory_{segment}", transmission(hold, signals))
+            network.add_synapse(f"pressure_{segment}", f"sensory_{segment}", p.transmission(hold))
         if exchange > 0 and n_segments > 3:
-            network.add_synapse(f"contraction_{segment}", f"sensory_{two_before}", transmission(exchange, signals))
+            network.add_synapse(f"contraction_{segment}", f"sensory_{two_before}", p.transmission(exchange))
         if release > 0:
             synapse = p.inhibitory(release * p.conductances.relay_to_next_sensory)
             network.add_synapse(f"extension_{segment}", f"sensory_{segment % n_segments + 1}", synapse)
@@ -309,7 +293,7 @@ def waiting_network(n_segments: int, parameters: PeristalsisParameters | None = 
     p = parameters or PeristalsisParameters()
     network = _segments(f"waiting peristalsis of {n_segments} segments", n_segments, p, relays_joined=False)
     reach, excitatory, inhibitory = p.range_mV, p.excitatory_reversal_mV, p.inhibitory_reversal_mV
-    through, silencing_uS = transmission(1.0, p.signals), p.conductances.relay_to_next_sensory
+    through, silencing_uS = p.transmission(), p.conductances.relay_to_next_sensory
     latch = Synapse(through.conductance_uS, excitatory, 0.4 * reach, 0.6 * reach)
     forgetting_uS = p.cancelling_uS(2.0 * through.conductance_uS, reach)
     forget = Synapse(forgetting_uS, inhibitory, 0.6 * reach, reach)
@@ -318,7 +302,7 @@ def waiting_network(n_segments: int, parameters: PeristalsisParameters | None = 
     both = Synapse(silencing_uS, inhibitory, (2.0 * alone + reach) / 3.0, (alone + 2.0 * reach) / 3.0)
     segments = range(1, n_segments + 1)
     for segment in segments:
-        network.add_neuron(f"memory_{segment}", p.signals.neuron, reach if segment == 1 else 0.0)
+        network.add_neuron(f"memory_{segment}", p.leaky_neuron, reach if segment == 1 else 0.0)
     for segment in segments:
         following = segment % n_segments + 1
         contraction, _, sensory, relay = (f"{role}_{segment}" for role in ROLES)

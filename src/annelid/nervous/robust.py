@@ -25,7 +25,6 @@ from dataclasses import dataclass
 from math import log, sqrt
 
 from annelid.errors import ConfigError, require_at_least, require_negative, require_positive
-from annelid.nervous.functional_subnetworks import transmission
 from annelid.nervous.half_centre import HalfCentre, add_half_centre, add_hold
 from annelid.nervous.network import Network
 from annelid.nervous.neurons import Neuron, Synapse
@@ -82,7 +81,7 @@ class RobustParameters(HalfCentre):
     @property
     def charge_uS(self) -> float:
         """Conductance with which a contraction neuron at R brings its relay, or another's hold, to R."""
-        return transmission(1.0, self.signals).conductance_uS
+        return self.transmission().conductance_uS
 
     @property
     def release_uS(self) -> float:
@@ -144,9 +143,9 @@ def robust_network(n_segments: int, parameters: RobustParameters | None = None) 
         first = segment == 1
         held = (-p.offset_mV, reach + p.offset_mV)
         add_half_centre(network, contraction, expansion, p, (reach, p.bifurcation_mV) if first else held)
-        network.add_neuron(hold, p.signals.neuron, 0.0 if first else reach)
+        network.add_neuron(hold, p.leaky_neuron, 0.0 if first else reach)
         network.add_neuron(relay, Neuron(tau_ms * (leak + p.charge_uS), leak), 0.0)
-        network.add_neuron(stretch, p.signals.neuron, 0.0)
+        network.add_neuron(stretch, p.leaky_neuron, 0.0)
         network.add_neuron(habit, Neuron(p.habit_ms * leak, leak), 0.0)
         add_hold(network, hold, down=contraction, up=expansion, half_centre=p)
         network.add_synapse(contraction, relay, p.excitatory(p.charge_uS))
@@ -213,7 +212,7 @@ def driven_robust_network(
     p, segments = parameters or RobustParameters(), range(1, n_segments + 1)
     network, leak = robust_network(n_segments, p), p.leak_conductance_uS
     relays = (f"relay_{segment}" for segment in segments)
-    add_drive(network, p, relays, transmission(lift, p.signals).conductance_uS, drive_ms)
+    add_drive(network, p, relays, p.transmission(lift).conductance_uS, drive_ms)
     share = p.excitatory(per_segment * leak * p.range_mV / p.excitatory_reversal_mV)
     for segment in segments:
         pressure = f"pressure_{segment}"

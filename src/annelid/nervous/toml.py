@@ -51,19 +51,7 @@ def network_tables(network: Wiring) -> dict[str, Any]:
 
 def read_network(text: str, make: type[Built]) -> Built:
     """Builds a network of the class ``make`` from TOML text."""
-    return network_of_tables(parse_toml(text, "the network"), make)
-
-
-def network_of_tables(document: Mapping[str, Any], make: type[Built]) -> Built:
-    """Builds a network of the class ``make`` from the tables of a text, as `network_tables` makes them.
-
-    Args:
-        document: The tables.
-        make: Class of the network.
-
-    Raises:
-        ConfigError: As of `annelid.nervous.Network.from_toml`.
-    """
+    document = parse_toml(text, "the network")
     _refuse_unknown(document, {"name", "neuron", "connection", "input", "output"}, "the network")
     network = make(_string(document.get("name", "network"), "the network's name"))
     for place, entry in _tables(document, "neuron"):

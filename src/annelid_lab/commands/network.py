@@ -15,7 +15,7 @@ from annelid.errors import shown, suggest
 def export_network_command(
     source: Annotated[
         str,
-        typer.Argument(metavar="PRESET|FILE", help="A preset, a configuration, or a network as TOML or LEMS (.xml)."),
+        typer.Argument(metavar="PRESET|FILE", help="A preset, a configuration, or a network as TOML."),
     ],
     to: Annotated[str, typer.Option(metavar="FORMAT", help="c, lems or toml.")] = "c",
     output: Annotated[
@@ -42,11 +42,11 @@ def export_network_command(
     """Write a network for other programs, or a worm's whole controller for a microcontroller.
 
     \b
-    c     C99: of a preset or a configuration the controller with its sensors' thresholds, its start, its turning and
-          the muscles' activation; of a network from the currents of its inputs to the potentials of its outputs.
+    c     C99: of a preset or a configuration the controller with its sensors' thresholds, its start and the
+          muscles' activation; of a network from the currents of its inputs to the potentials of its outputs.
           A header, a source file and a self-test
     lems  LEMS, the language of NeuroML 2, for pyLEMS and jNeuroML: the network alone, of a preset too
-    toml  the network alone as Network.to_toml writes it; reads LEMS files that annelid wrote
+    toml  the network alone as Network.to_toml writes it
 
     \b
     annelid export-network riddle2022-planar -o firmware
@@ -54,7 +54,6 @@ def export_network_command(
     annelid export-network riddle2023-rods -o firmware --float --wire
     annelid export-network network.toml -o firmware --timestep-ms 0.5
     annelid export-network riddle2023-rods --to lems -o network.xml
-    annelid export-network network.xml --to toml
     """
     from typing import cast
 
@@ -64,15 +63,14 @@ def export_network_command(
     from annelid.simulation import build_controller, build_plant
     from annelid.textfiles import read_text, read_toml
     from annelid_lab.firmware import controller_firmware, controller_network, network_firmware
-    from annelid_lab.lems import lems_text, read_lems
+    from annelid_lab.lems import lems_text
 
     files = {"c": "firmware", "lems": "network.xml", "toml": "network.toml"}
     if to not in files:
         raise typer.BadParameter(f"--to {shown(to)}: {suggest(to, files)}")
     path = Path(source)
     is_file = source not in preset_names() and path.is_file()
-    is_lems = is_file and path.suffix == ".xml" and "<Lems" in read_text(path)
-    is_network = is_lems or (is_file and path.suffix != ".xml" and "neuron" in read_toml(path))
+    is_network = is_file and path.suffix != ".xml" and "neuron" in read_toml(path)
     other = to != "c" and f"the network as {to}"
     controller = not is_network and "a controller, which has the step and the scheme of its configuration"
     for option, value, reason in (
@@ -91,7 +89,7 @@ def export_network_command(
     real = "float" if single else "double"
     name, worm = "", None
     if is_network:
-        network = read_lems(path) if is_lems else Network.from_toml(read_text(path))
+        network = Network.from_toml(read_text(path))
     else:
         config = config_of(source, overrides_of(assignments), segments).model_copy(update={"trial": None})
         name, worm = config.name, build_controller(config, build_plant(config))

@@ -20,7 +20,6 @@ from annelid.control import SENSED, CircuitController
 from annelid.errors import ConfigError, RunFileError
 from annelid.nervous import NO_GATE, Network, NetworkState, Scheme, Stepper
 from annelid.output import write_text
-from annelid.protocols import SteeringCode
 from annelid.text import numbered
 
 Real = Literal["double", "float"]
@@ -37,7 +36,7 @@ _SCHEMES: dict[Scheme, str] = {
     "toolbox": "forward Euler, gates before potentials",
     "heun": "Heun's method",
 }
-_INTERFACE = re.compile(r"\b(EXP|POW|FMOD|ATAN2)\(")
+_INTERFACE = re.compile(r"\b(EXP|POW)\(")
 _UNSAFE = re.compile(r"[^A-Za-z0-9 _.,:;()+=-]")
 
 
@@ -125,7 +124,7 @@ def comment(text: str) -> str:
 
 
 class Writer:
-    """Fills the templates with a network, and with the circuit that it is of and its steering, if any."""
+    """Fills the templates with a network, and with the circuit that it is of, if any."""
 
     def __init__(
         self,
@@ -136,10 +135,9 @@ class Writer:
         title: str,
         vectors: Vectors,
         controller: CircuitController | None = None,
-        steering: SteeringCode | None = None,
     ) -> None:
         self._network, self._stepper, self._start, self._vectors = network, stepper, start, vectors
-        self._controller, self._steering = controller, steering or SteeringCode()
+        self._controller = controller
         self._real: Real = real
         self._title = comment(title)
         name = identifier(title.strip(), LONGEST_NAME).strip("_").lower() or "network"
@@ -323,7 +321,7 @@ class Writer:
     # What they have of the circuit.
 
     def _circuit_words(self) -> dict[str, Any]:
-        names = ("sensing", "linear", "switches", "windows", "expanding", "sigmoid", "line")
+        names = ("sensing", "linear", "switches", "windows", "expanding", "sigmoid", "line", "clips")
         words: dict[str, Any] = dict.fromkeys(names, False) | {"controller": self._controller is not None}
         words |= {"n_segments": 0, "n_muscles": 0, "per_segment": 0, "n_linear": 0, "n_switches": 0, "read_out": ""}
         if self._controller is None:
@@ -355,8 +353,6 @@ class Writer:
         else:
             for name, number in zip(("low_mV", "high_mV", "length_mV", "offset"), readout.line, strict=True):
                 self._table(f"line_{name}", np.array(number))
-        for name, value in self._steering.constants.items():
-            self._table(name, value)
         return words | {
             "sensing": len(sensed) > 0,
             "linear": table.n_linear > 0,
@@ -365,6 +361,7 @@ class Writer:
             "expanding": bool(readout.expanding),
             "sigmoid": readout.slope_per_mV is not None,
             "line": readout.slope_per_mV is None,
+            "clips": table.n_linear > 0 or readout.slope_per_mV is None,
             "n_segments": circuit.n_segments,
             "n_muscles": circuit.n_segments * self._controller.muscles_per_segment,
             "per_segment": self._controller.muscles_per_segment,
@@ -391,7 +388,6 @@ class Writer:
         state: dict[str, NDArray[Any]] = {}
         if self._controller is not None and (n_switches := len(self._controller.table.hysteresis)):
             state["sensor_on"] = np.zeros(n_switches)
-        state |= {label: np.asarray(value) for label, value in self._steering.state.items()}
         parts = [("potential_mV", self._start.potential[0])]
         slow = [(slot, channel) for slot, channel in self._gates if slot < a.n_slow]
         if slow:
@@ -421,8 +417,6 @@ class Writer:
             "no_inputs": n_inputs == 0,
             "given": "input_nA" if is_controller and n_inputs else "sensors->input_nA" if sensed and n_inputs else "0",
             "nothing_sensed": not sensed or (not is_controller and not n_inputs),
-            "helpers": self._steering.helpers,
-            "steering": self._steering.statements.strip("\n"),
             "n_steps": N_BLOCKS * STEPS,
             "n_blocks": N_BLOCKS,
             "steps": STEPS,

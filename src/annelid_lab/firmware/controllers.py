@@ -10,7 +10,7 @@ import numpy as np
 from annelid.control import SENSED, CircuitController, TurningController
 from annelid.errors import ConfigError, shown
 from annelid.nervous import Network, Scheme
-from annelid.protocols import Controller, Sensation, SteeringCode
+from annelid.protocols import Controller, Sensation
 from annelid_lab.firmware.c_source import N_BLOCKS, STEPS, Firmware, Real, Vectors, Writer, filled
 from annelid_lab.loop.frames import MOST_STEPS, VERSION, Interface, most_stuffed
 
@@ -42,27 +42,32 @@ def network_firmware(
 
 
 def controller_firmware(controller: Controller, name: str = "controller", *, real: Real = "double") -> Firmware:
-    """Writes a circuit as C99: what it senses, its network, its readout, and its turning, if any.
+    """Writes a circuit as C99: what it senses, its network and its readout.
 
     Args:
-        controller: A controller that is a circuit, turned or not; it is reset.
+        controller: A controller that is a circuit; it is reset.
         name: What to call it.
         real: Type of all numbers.
 
     Raises:
         ConfigError: The controller cannot be written as C, or a number is too large for the type.
     """
-    circuit, steering = _parts(controller)
+    circuit = _circuit_of(controller)
+    if circuit is not controller:
+        raise ConfigError(
+            "turning is not written as C: leave out the section [turning], and scale the activation of the two sides "
+            "in your own program"
+        )
     if circuit.table.functions:
         place, _ = circuit.table.functions[0]
         name = list(circuit.circuit.network.inputs)[place]
         raise ConfigError(f"input {shown(name)} is set by a function of Python, which is not written as C")
     controller.reset(0)
-    start, senses = circuit.network_state.copy(), tuple(dict.fromkeys((*circuit.senses, *steering.senses)))
-    vectors = _controller_vectors(controller, circuit, senses)
+    start, senses = circuit.network_state.copy(), circuit.senses
+    vectors = _controller_vectors(circuit)
     controller.reset(0)
     network, n_muscles = circuit.circuit.network, circuit.n_segments * circuit.muscles_per_segment
-    writer = Writer(network, circuit.stepper, start, real, name, vectors, circuit, steering)
+    writer = Writer(network, circuit.stepper, start, real, name, vectors, circuit)
     firmware = writer.firmware("activation", n_muscles)
     # A very long worm has more numbers than a frame holds, and goes without.
     with suppress(ConfigError):
@@ -94,23 +99,21 @@ def controller_network(controller: Controller) -> Network:
     Raises:
         ConfigError: The controller steps none.
     """
-    return _parts(controller)[0].circuit.network
+    return _circuit_of(controller).circuit.network
 
 
-def _parts(controller: Controller) -> tuple[CircuitController, SteeringCode]:
-    """The circuit of a controller, and its turning as C."""
-    steering, inner = SteeringCode(), controller
-    if isinstance(controller, TurningController):
-        steering, inner = controller.between.code(), controller.inner
+def _circuit_of(controller: Controller) -> CircuitController:
+    """The circuit of a controller, turned or not."""
+    inner = controller.inner if isinstance(controller, TurningController) else controller
     if not isinstance(inner, CircuitController):
         raise ConfigError(
             f"{getattr(controller, 'name', type(controller).__name__)} cannot be exported: only controllers that step "
             "a network can (sns, adaptive, sns-pressure, sns-waiting, sns-robust, and every other circuit)"
         )
-    return inner, steering
+    return inner
 
 
-def _controller_vectors(controller: Controller, circuit: CircuitController, senses: tuple[str, ...]) -> Vectors:
+def _controller_vectors(circuit: CircuitController) -> Vectors:
     rng, n, vectors = np.random.default_rng(0), circuit.n_segments, Vectors()
     timestep_s, n_muscles = circuit.timestep_s, n * circuit.muscles_per_segment
     for block in range(N_BLOCKS):
@@ -129,7 +132,7 @@ def _controller_vectors(controller: Controller, circuit: CircuitController, sens
         )
         potentials, activations = [], []
         for step in range(block * STEPS, (block + 1) * STEPS):
-            activations.append(controller.step(replace(sensation, time_s=step * timestep_s)))
+            activations.append(circuit.step(replace(sensation, time_s=step * timestep_s)))
             potentials.append(circuit.potential_mV.copy())
-        vectors.add({name: SENSED[name].read(sensation) for name in senses}, potentials, activations)
+        vectors.add({name: SENSED[name].read(sensation) for name in circuit.senses}, potentials, activations)
     return vectors

@@ -131,8 +131,10 @@ def _of_run(job: Job) -> Path:
 
 
 def _arenas(job: Job) -> Path:
+    from matplotlib.patches import Patch
+
     from annelid.analysis import nearest_time
-    from annelid.draw import DEFAULT_CAMERA, WIDTH_IN, WormScene, canvas, legend_handle, save
+    from annelid.draw import DEFAULT_CAMERA, WIDTH_IN, WormScene, canvas, save
 
     found, time_s, handles = cases(job.picture), job.picture.time_s, []
     width, height = TILE_PX
@@ -145,7 +147,7 @@ def _arenas(job: Job) -> Path:
             run, camera = job.store.run(case), job.picture.cameras.get(name, DEFAULT_CAMERA)
             with WormScene(run, width, height, camera, fine=True, words=False) as scene:
                 axes.imshow(scene.picture(nearest_time(run, scene.times_s, time_s)))
-                handles = [legend_handle(*entry) for entry in scene.legend]
+                handles = [Patch(color=tuple(rgb[:3]), label=name) for name, rgb, _ in scene.legend]
             axes.set_title(name, fontsize=8.0, pad=2.0)
         look: dict[str, Any] = {"loc": "center left", "alignment": "left", "fontsize": 8.0}
         panels[len(found)].legend(handles=handles, title=f"{time_s:g} s after the start", **look)

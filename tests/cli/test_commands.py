@@ -100,16 +100,12 @@ def test_plot_and_render_write_where_they_are_told(annelid: Command, finished: P
     assert Path("v.mp4").stat().st_size > 1000
 
 
-def test_render_takes_a_background_and_refuses_a_strip_of_a_planar_worm(annelid: Command, finished: Path) -> None:
+def test_render_takes_a_background(annelid: Command, finished: Path) -> None:
     import imageio.v3
 
     done = annelid("draw", finished, "--time", "0.5", "-o", "dark.png", "--background", "dark")
     assert done.exit_code == 0, done.err
     assert imageio.v3.imread("dark.png")[0, 0, :3].tolist() == [20, 22, 26]
-    done = annelid("draw", finished, "--strip", "s.pdf")
-    assert done.exit_code == 2
-    assert "planar" in done.err
-    assert not Path("s.pdf").exists()
 
 
 def test_a_network_file_is_exported_and_kept_without_force(annelid: Command) -> None:

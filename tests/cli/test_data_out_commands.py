@@ -51,7 +51,7 @@ def test_named_files_are_not_replaced_without_force(annelid: Command, run: Path)
     ("arguments", "words"),
     [
         (("--to", "xlsx"), "unknown format 'xlsx'"),
-        (("--to", "gif", "--every", "2"), "--every has no effect on gif, which takes --from-time, --to-time"),
+        (("--to", "html", "--every", "2"), "--every has no effect on html, which takes --from-time, --to-time"),
         (("--to", "mjcf", "--to-time", "1"), "--to-time has no effect on mjcf, which takes the whole run"),
         (("--to", "mat", "-o", "run.csv"), "must end in .mat"),
         (("--to", "mjcf"), "needs the 3D worm"),

@@ -8,7 +8,8 @@ import pytest
 from PIL import Image
 
 from annelid.config import fields_of
-from annelid.export import Selection, find_format, page, selected
+from annelid.draw.render import render_video
+from annelid.export import Selection, page, selected
 from annelid.export.page import write_page
 from annelid.references import references_of
 from annelid.simulation.runfile import Run
@@ -61,8 +62,9 @@ def test_a_figure_that_cannot_be_drawn_leaves_its_reason(planar_run: Run, tmp_pa
 def test_a_gif_shows_the_frames_of_the_window_at_its_rate(planar_run: Run, tmp_path: Path) -> None:
     part = selected(planar_run, Selection(start_s=0.4, stop_s=0.8))
     steps: list[int] = []
-    (path,) = find_format("gif").write(part, tmp_path / "worm.gif", lambda done, total: steps.append(total))
-    with Image.open(path) as image:
+    with Image.open(
+        render_video(part, tmp_path / "worm.gif", fps=12.5, progress=lambda done, total: steps.append(total))
+    ) as image:
         assert image.format == "GIF"
         assert getattr(image, "n_frames", 0) == len(steps) == 6
         assert image.info["duration"] == 80

@@ -59,8 +59,8 @@ def plant_of(show: Show) -> WormPlant:
 def ask(show: Show, page: Page, *call: object) -> None:
     """Has the loop do something, and waits until it has."""
     done: list[bool] = []
-    show.request(*call)  # type: ignore[arg-type]
-    show.request(done.append, True)
+    show.requests.add(*call)  # type: ignore[arg-type]
+    show.requests.add(done.append, True)
     wait_for(lambda: done, page)
 
 

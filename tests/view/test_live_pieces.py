@@ -291,7 +291,7 @@ def test_a_ray_is_turned_into_the_axes_of_a_slope() -> None:
     try:
         stage = Stage(server, config, painter_of(anatomy, config, player.moment), player.moment)
         player.tick(0.5)
-        stage.show(player.moment, follow=True)
+        stage.show(player.moment)
         place, along = np.array([0.3, -0.1, 0.2]), np.array([0.0, 0.6, 0.8])
         seen = stage.turn @ place + stage.shift_m
         origin, sight = stage.to_model(seen, stage.turn @ along)

@@ -14,7 +14,7 @@ from annelid.body.worm import WormBody
 from annelid.config import load_config
 from annelid.draw.drawn_worm import DrawnWorm
 from annelid.draw.overlay import Overlay, bar_length, length_name
-from annelid.draw.render import render_frame, render_strip, render_video
+from annelid.draw.render import render_frame, render_video
 from annelid.draw.scene import WormScene
 from annelid.errors import MissingDependency, RunFileError
 from annelid.simulation.loop import simulate
@@ -249,19 +249,3 @@ def test_soft_crossings_have_a_bar_to_each_strand(subtests: pytest.Subtests) -> 
             worm.add_links(scene)
             assert scene.ngeom == n_links * config.body.geometry().n_crossings
             assert ("soft" in worm.legend()[-1][0]) == (n_links > 0)
-
-
-@needs_gl
-def test_a_strip_has_its_frames_in_rows(rods_run: Run, tmp_path: Path) -> None:
-    width, height = imageio.v3.imread(render_strip(rods_run, tmp_path / "strip.png", 4)).shape[1::-1]
-    assert width == pytest.approx(7.2 * 300, abs=2)
-    assert height > 0.4 * width, "two rows"
-
-
-def test_impossible_strips_are_refused(planar_run: Run, tmp_path: Path) -> None:
-    with pytest.raises(RunFileError, match="planar"):
-        render_strip(planar_run, tmp_path / "a.png")
-    with pytest.raises(RunFileError, match="1 frames: a strip has 2 to 24"):
-        render_strip(planar_run, tmp_path / "a.png", 1)
-    with pytest.raises(RunFileError, match=r"\.pdf"):
-        render_strip(planar_run, tmp_path / "a.gif")

@@ -1,4 +1,4 @@
-"""The commands `list ..`: presets, arenas, the numbers of a run, and runs, which it removes where the user says so."""
+"""The commands `list ..`: presets, arenas, the numbers of a run, and runs."""
 
 from __future__ import annotations
 
@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from annelid.cli.common import FIRST_PRESET
-from annelid.cli.entry import complain, listing
+from annelid.cli.entry import listing
 from annelid.cli.json_output import give, refuse_json
-from annelid.errors import ConfigError, listed
 
 if TYPE_CHECKING:
     from annelid.config import RunConfig
@@ -122,43 +121,18 @@ def _print_table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None
 @listing("runs")
 def runs_command(
     folder: Annotated[Path, typer.Argument(help="Folder to look in, with all folders below it.")] = Path("runs"),
-    clean: Annotated[
-        list[Path] | None,
-        typer.Option("--clean", metavar="RUN", help="Remove this run, a folder of the list; may be repeated."),
-    ] = None,
-    yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask before --clean removes anything.")] = False,
 ) -> None:
-    """List the runs that are there, or remove some.
+    """List the runs that are there.
 
     Prints the folder, preset, simulated time, size, date and end of every run and of every outcome that a study kept.
-    --clean removes only files that annelid wrote for a run: run.nc, outcome.json, figure7.png, frame.png, video.mp4.
-    A folder with anything else in it stays. A run that is being written or cannot be read is refused.
 
     \b
     annelid list runs
     annelid list runs sweep --json
-    annelid list runs --clean runs/riddle2023-001 --yes
     """
-    from annelid.experiment.run_list import remove, runs_below
+    from annelid.experiment.run_list import runs_below
 
-    refuse_json(bool(clean), "--clean")
     found = list(runs_below(folder)) if folder != Path("runs") or folder.is_dir() else []
-    if clean:
-        # Paths to remove come from the list, never from what was typed.
-        named = {path.resolve() for path in clean}
-        chosen = [run for run in found if run.folder.resolve() in named]
-        if missing := named - {run.folder.resolve() for run in chosen}:
-            raise ConfigError(f"no run of {folder}: {listed(sorted(path.name for path in missing))}")
-        typer.echo("\n".join(str(run.folder) for run in chosen))
-        if not yes:
-            typer.confirm(
-                f"Remove {len(chosen)} runs, {sum(run.size_bytes for run in chosen) / 1e6:.1f} MB?", abort=True
-            )
-        for run in chosen:
-            remove(run)
-            if run.folder.exists():
-                complain(f"{run.folder} stays: it has other files")
-        return
     if give([asdict(run) for run in found]):
         return
     from rich.table import Table

@@ -75,7 +75,7 @@ def draw_command(
         typer.Option(
             metavar="FIGURE",
             help="figure7: potentials and lengths; track: the path, seen from above; network: neurons and synapses."
-            "  [default: figure7, unless a frame, a strip or a video is drawn]",
+            "  [default: figure7, unless a frame or a video is drawn]",
         ),
     ] = None,
     at: Annotated[float | None, typer.Option("--time", help="Draw one frame at this time, s.")] = None,
@@ -83,10 +83,6 @@ def draw_command(
         Path | None,
         typer.Option("--output", "-o", help="Figure or frame to write  [default: FIGURE.png or frame.png in the run]"),
     ] = None,
-    strip: Annotated[
-        Path | None, typer.Option(help="Draw the last cycle as frames side by side: .png, .pdf, .svg")
-    ] = None,
-    frames: Annotated[int, typer.Option(min=2, max=24, help="Frames of the strip.")] = 6,
     video: Annotated[Path | None, typer.Option(help="Draw a video: .mp4, .mov, .mkv, .gif")] = None,
     fps: Annotated[float, typer.Option(help="Frames a second of the video, 1 to 240.")] = 25.0,
     speed: Annotated[float, typer.Option(help="Simulated seconds a second of video.")] = 1.0,
@@ -98,7 +94,7 @@ def draw_command(
     ] = None,
     force: Force = False,
 ) -> None:
-    """Draw a run: a figure, a frame, a strip of frames or a video.
+    """Draw a run: a figure, a frame or a video.
 
     Figures are .png, .pdf or .svg: the counterpart of the paper's figure 7; the paths of the worm's middle and front
     with its outline at several times; or the network of its controller, with a key. Frames come from the recorded
@@ -111,24 +107,24 @@ def draw_command(
     annelid draw runs/riddle2023-001 --figure network -o network.svg
     annelid draw runs/riddle2023-001 --time 1.5 --camera side -o side.png
     annelid draw runs/riddle2023-001 --video slow.mp4 --speed 0.25
-    annelid draw runs/riddle2023-001 --strip cycle.pdf --background white
+    annelid draw runs/riddle2023-001 --time 1.5 --background white -o white.png
     """
     from annelid.draw.gallery import VIDEO_TASK, task_bar
     from annelid.draw.notebook import plot
     from annelid.draw.plots import plot_path
-    from annelid.draw.render import render_frame, render_strip, render_video
+    from annelid.draw.render import render_frame, render_video
     from annelid.simulation.runfile import open_run
 
     if figure is not None and at is not None and output is not None:
         raise typer.BadParameter("-o names one picture: draw --figure and --time by two commands")
-    if figure is None and (at, strip, video) == (None, None, None):
+    if figure is None and at is None and video is None:
         figure = "figure7"
     if output is not None and figure is None and at is None:
         raise typer.BadParameter("-o names the figure or the frame: it needs --figure FIGURE or --time SECONDS as well")
     opened = open_run(run)
     if figure is not None and output is not None:
         output = plot_path(output)
-    for target in (output, strip, video):
+    for target in (output, video):
         if target is not None:
             refuse_existing(target, force)
     if figure is not None:
@@ -136,8 +132,6 @@ def draw_command(
     frame = opened.path.parent / "frame.png" if output is None else output
     if at is not None:
         print_paths([render_frame(opened, at, frame, camera=camera, background=background)])
-    if strip is not None:
-        print_paths([render_strip(opened, strip, frames, camera=camera, background=background)])
     if video is not None:
         with task_bar(VIDEO_TASK) as progress:
             render_video(opened, video, fps=fps, speed=speed, camera=camera, background=background, progress=progress)
@@ -220,7 +214,7 @@ def export_command(
             autocompletion=worms_from,
         ),
     ],
-    to: Annotated[str, typer.Option(metavar="FORMAT", help="csv, mat, parquet, nwb, mp4, gif, html or mjcf.")],
+    to: Annotated[str, typer.Option(metavar="FORMAT", help="csv, mat, parquet, nwb, html or mjcf.")],
     output: Annotated[
         Path | None,
         typer.Option("--output", "-o", help="File to write, or folder of csv and parquet  [default: in the run]"),
@@ -247,7 +241,7 @@ def export_command(
     force: Force = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress bar.")] = False,
 ) -> None:
-    """Write a run for other programs: tables, NWB, video, HTML, MJCF.
+    """Write a run for other programs: tables, NWB, HTML, MJCF.
 
     \b
     csv      a table for all signals of the same dimensions, units in the header; about.json says what the run is
@@ -255,12 +249,11 @@ def export_command(
     parquet  the same tables as csv, units in the metadata (pip install 'annelid[export]')
     nwb      Neurodata Without Borders: potentials as intracellular series, behaviour and positions beside
              (pip install 'annelid[export]')
-    mp4 gif  a video; annelid draw has camera, speed and frame rate
     html     one page that needs nothing else: numbers, figures, configuration, what to cite
     mjcf     the model for plain MuJoCo, the last state as a keyframe; of a worm that was not run with a keyframe rest
              where it has servos, to be loaded before the first step: in it their cables are paid out
 
-    A network or a whole controller is written by annelid export-network.
+    A video is drawn by annelid draw, a network or a whole controller written by annelid export-network.
 
     \b
     annelid export runs/riddle2023-rods-001 --to csv

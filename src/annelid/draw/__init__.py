@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from annelid.draw.figures.experiments import progress_figure, uncertainty_figure
     from annelid.draw.figures.network_diagram import network_figure
     from annelid.draw.gl import find_backend
-    from annelid.draw.overlay import legend_handle
     from annelid.draw.page import html_page
     from annelid.draw.plots import figure7, plot_path
     from annelid.draw.render import DEFAULT_CAMERA, render_frame, render_video
@@ -61,7 +60,6 @@ __all__ = [
     "fitting_distance",
     "framed_table",
     "html_page",
-    "legend_handle",
     "lengths_figure",
     "line_looks",
     "network_figure",

@@ -5,27 +5,21 @@ The report is Markdown that names no user, no machine and no folder.
 
 from __future__ import annotations
 
-import getpass
 import os
 import platform
 import re
 import subprocess
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, requires, version
 from importlib.util import find_spec
-from pathlib import Path
 
-from annelid.draw.gl import UNSET, candidates, find_backend, works
+from annelid.draw.gl import BACK_ENDS, UNSET, candidates, find_backend, works
 from annelid.engine import REMEDY, mixed_engine
 from annelid.errors import RenderingUnavailable
 
-MINIMUM_MUJOCO = (4, 0, 1)
 _PACKAGES = ("numpy", "pydantic", "xarray", "h5netcdf", "h5py", "matplotlib", "imageio", "typer", "rich")
 _DEVELOPERS_EXTRAS = ("test", "dev")
-BACK_ENDS = ("egl", "osmesa", "glfw", "wgl", "cgl")  # values of MUJOCO_GL that a bug report may name
-_PATH = re.compile(r"(?:(?<!\w)[A-Za-z]:|(?<!\w))(?:[/\\]+[^\s/\\'\":;,()]+)+[/\\]*")
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,17 +56,13 @@ def examine() -> Iterator[Finding]:
 
 
 def _engine() -> Finding:
-    remedy = "pip install 'mujoco-core[rendering]>=4.0.1'"
     if mixed := mixed_engine():
         return Finding("mujoco", False, mixed, REMEDY)
     try:
         import mujoco
     except Exception as error:  # A back-end that MUJOCO_GL names fails in as many ways as there are libraries.
-        remedy = remedy if isinstance(error, ImportError) else UNSET
+        remedy = "pip install 'mujoco-core[rendering]>=4.0.1'" if isinstance(error, ImportError) else UNSET
         return Finding("mujoco", False, str(error).splitlines()[0], remedy)
-    found = tuple(int(part) for part in mujoco.__version__.split(".")[:3] if part.isdigit())
-    if found < MINIMUM_MUJOCO:
-        return Finding("mujoco", False, f"{mujoco.__version__} is too old", remedy)
     return Finding("mujoco", True, mujoco.__version__)
 
 
@@ -127,61 +117,19 @@ def _optional_packages() -> dict[str, str]:
 
 
 def bug_report(findings: Sequence[Finding]) -> str:
-    """Returns what a bug report should say of a machine, as Markdown: versions, processor, and what `examine` found."""
-    try:
-        core = version("mujoco-core")
-    except PackageNotFoundError:
-        core = "not installed"
+    """Returns what a bug report should say of a machine, as Markdown: versions, and what `examine` found.
+
+    What is wrong with a finding is left out, since it may name a folder.
+    """
     backend = os.environ.get("MUJOCO_GL") or "not set"
+    named = sum(BACK_ENDS.values(), ("not set",))
     facts = {
-        "annelid": " ".join(filter(None, (version("annelid"), _commit()))),
-        "mujoco-core": core,
+        "annelid": version("annelid"),
         "Python": f"{platform.python_version()} ({platform.python_implementation()})",
         "system": f"{platform.system()} {platform.release()} {platform.machine()} {' '.join(platform.libc_ver())}",
-        "processor": f"{_processor()}, {os.cpu_count()} logical cores",
-        "MUJOCO_GL": backend if backend in ("not set", *BACK_ENDS) else "set to something else than a back-end",
+        "processor": f"{os.cpu_count()} logical cores",
+        "MUJOCO_GL": backend if backend in named else "set to something else than a back-end",
     }
-    lines = [f"- {name}: {without_names(value).strip()}" for name, value in facts.items()]
-    rows = [f"| {each.item} | {each.state} | {without_names(each.detail)} |" for each in findings]
+    lines = [f"- {name}: {value}" for name, value in facts.items()]
+    rows = [f"| {each.item} | {each.state} | {each.detail if each.ok else ''} |" for each in findings]
     return "\n".join([*lines, "", "| item | state | detail |", "|---|---|---|", *rows])
-
-
-def without_names(text: str) -> str:
-    """Returns a text in which paths are cut down to their last part, and the user and the machine are not named."""
-    text = text.replace(str(Path.home()), "/HOME") if len(Path.home().parts) > 1 else text
-    text = _PATH.sub(lambda path: "../" + re.split(r"[/\\]", path[0].rstrip("/\\"))[-1], text)
-    names = {platform.node(): "MACHINE", platform.node().split(".")[0]: "MACHINE"}
-    # A user without a name, as in some containers, needs none hidden.
-    with suppress(OSError, KeyError, ImportError):
-        names = {getpass.getuser(): "USER"} | names
-    for name, instead in names.items():
-        text = re.sub(rf"(?<!\w){re.escape(name)}(?!\w)", instead, text) if name else text
-    return " ".join(text.replace("|", "/").split())
-
-
-def _processor() -> str:
-    """The model of the processor, as the system calls it."""
-    with suppress(OSError):
-        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
-            if line.startswith("model name"):
-                return line.partition(":")[2].strip()
-    if platform.system() == "Darwin":
-        with suppress(OSError, subprocess.SubprocessError):
-            return _answer("sysctl", "-n", "machdep.cpu.brand_string")
-    return platform.processor() or "unknown processor"
-
-
-def _commit() -> str:
-    """The commit of the checkout that annelid is imported from, and whether files differ from it; empty elsewhere."""
-    root = Path(__file__).parents[3]
-    if not (root / ".git").exists():
-        return ""
-    with suppress(OSError, subprocess.SubprocessError):
-        commit = _answer("git", "-C", str(root), "rev-parse", "--short=12", "HEAD")
-        changed = _answer("git", "-C", str(root), "status", "--porcelain", "--untracked-files=no")
-        return f"(commit {commit}{', modified' if changed else ''})"
-    return ""
-
-
-def _answer(*command: str) -> str:
-    return subprocess.run(command, capture_output=True, text=True, check=True, timeout=10).stdout.strip()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,10 +11,9 @@ from annelid.draw.plots import figure7
 from annelid.draw.render import Progress, render_frame, render_video
 from annelid.errors import AnnelidError
 from annelid.simulation.runfile import Run
-from annelid.terminal import Console
+from annelid.terminal import progress_bar
 
 FRAME_TIME_S = 1.5  # time of the frame, as in the paper's Fig. 8; half of the run where it is shorter
-BAR_AFTER_S = 2.0
 VIDEO_TASK = "drawing the video"
 
 
@@ -62,22 +60,9 @@ def frame_time_s(run: Run) -> float:
 
 @contextmanager
 def task_bar(task: str, *, quiet: bool = False) -> Iterator[Progress | None]:
-    """Gives a progress callback whose bar shows up on a terminal once a task takes more than two seconds."""
+    """Gives a progress callback with a bar on a terminal, None elsewhere."""
     if quiet or not sys.stderr.isatty():
         yield None
-        return
-    from rich.progress import Progress as Bar
-
-    began = time.monotonic()
-    bar = Bar(console=Console(stderr=True), transient=True, auto_refresh=False)
-    shown = bar.add_task(task)
-
-    def update(done: int, total: int) -> None:
-        if time.monotonic() - began > BAR_AFTER_S:
-            bar.start()
-            bar.update(shown, completed=done, total=total, refresh=True)
-
-    try:
-        yield update
-    finally:
-        bar.stop()
+    else:
+        with progress_bar(transient=True) as draw:
+            yield lambda done, total: draw(task, done / total, "")

@@ -6,7 +6,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import matplotlib
 import numpy as np
@@ -14,9 +13,6 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from annelid.errors import RunFileError, suggest
-
-if TYPE_CHECKING:
-    from matplotlib.lines import Line2D
 
 Entry = tuple[str, Sequence[float], str]  # name, colour and look, ``line`` or ``ball``
 
@@ -139,20 +135,3 @@ def bar_length(width: int, pixels_per_m: float) -> float:
 def length_name(length_m: float) -> str:
     """Writes a length with its unit."""
     return f"{_CM * length_m:g} cm" if length_m < 1.0 else f"{length_m:g} m"
-
-
-def legend_handle(name: str, rgb: Sequence[float], look: str) -> Line2D:
-    """Returns what stands in a legend for an entry.
-
-    Args:
-        name: What the legend says.
-        rgb: Colour, three numbers from 0 to 1.
-        look: ``line`` or ``ball``.
-    """
-    from matplotlib.lines import Line2D
-
-    red, green, blue = rgb[:3]
-    color = red, green, blue
-    if look == "ball":
-        return Line2D([], [], color="none", marker="o", markerfacecolor=color, markeredgecolor="none", label=name)
-    return Line2D([], [], color=color, linewidth=3.0, label=name)

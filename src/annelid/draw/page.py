@@ -17,14 +17,6 @@ from annelid.text import printable
 if TYPE_CHECKING:
     from markdown_it.token import Token
 
-BADGES = {
-    "holds within": "nearly",
-    "holds": "holds",
-    "rests on": "rests",
-    "does not hold": "fails",
-    "not testable here": "open",
-}
-"""The first words of a verdict, and the class of its badge; the first that fits counts."""
 # A cell of so few characters, such as an order 1-2-3, stays on one line.
 _SHORT = 12
 _SKELETON = """<!DOCTYPE html>
@@ -55,18 +47,13 @@ _SKELETON = """<!DOCTYPE html>
 _PICTURE = re.compile(r"<p>(<img [^>]*>)</p>\s*<p>(.*?)</p>", re.DOTALL)
 _SECTION = re.compile(r'<h3 id="([^"]*)">(.*?)</h3>(.*?)(?=<h[1-3] |\Z)', re.DOTALL)
 _FOLDED = r'<details>\n<summary><h3>\2</h3></summary>\n<div class="folded" id="\1">\3</div>\n</details>\n'
-_NUMBERED = re.compile(r"<table>\s*<thead>\s*<tr>\s*<th[^>]*>#</th>.*?</table>\s*<ol.*?</ol>", re.DOTALL)
-_ROW = re.compile(r"<tr>(.*?)</tr>", re.DOTALL)
-_CELL = re.compile(r"<t[hd][^>]*>(.*?)</t[hd]>", re.DOTALL)
-_ITEM = re.compile(r"<li>(.*?)</li>", re.DOTALL)
 
 
 def html_page(title: str, head: str, contents: str, content: str, folder: Path) -> str:
     """Returns an HTML page.
 
-    Beyond plain Markdown, a picture and the paragraph after it become a figure with its caption, and the items of
-    the list that follows a table of numbered rows (first column ``#``) move into the table, each below its row. What
-    stands below a heading of the third level is folded until it is clicked, or a link leads to it.
+    Beyond plain Markdown, a picture and the paragraph after it become a figure with its caption. What stands below a
+    heading of the third level is folded until it is clicked, or a link leads to it.
 
     Args:
         title: Its title, plain text.
@@ -102,32 +89,9 @@ def _html(markdown: str, folder: Path) -> str:
                 child.attrSet("src", f"data:image/png;base64,{base64.b64encode(picture).decode()}")
     html: str = reader.renderer.render(tokens, reader.options, {})
     html = _PICTURE.sub(r"<figure>\n\1\n<figcaption>\2</figcaption>\n</figure>", html)
-    html = _NUMBERED.sub(_with_notes, html)
     html = re.sub(r"<table.*?</table>", r'<div class="table" tabindex="0">\g<0></div>', html, flags=re.DOTALL)
     return _SECTION.sub(_FOLDED, html)
 
 
 def _text(inline: Token) -> str:
     return "".join(child.content for child in inline.children or ())
-
-
-def _with_notes(match: re.Match[str]) -> str:
-    """Returns a table of numbered rows with the items of the list after it below its rows."""
-    rows, _, notes = match[0].partition("</table>")
-    header, *body = [_CELL.findall(row) for row in _ROW.findall(rows)]
-    groups = []
-    for cells, note in zip(body, _ITEM.findall(notes), strict=True):
-        named = zip(header, cells, strict=True)
-        row = "".join(f'<td data-name="{name}">{_badge(name, text)}</td>' for name, text in named)
-        below = f'<td></td><td colspan="{len(header) - 1}">{note.strip()}</td>'
-        groups.append(f'<tbody id="claim-{cells[0]}">\n<tr>{row}</tr>\n<tr class="note">{below}</tr>\n</tbody>')
-    head = "".join(f"<th>{name}</th>" for name in header)
-    return "\n".join(['<table class="claims">', f"<thead><tr>{head}</tr></thead>", *groups, "</table>"])
-
-
-def _badge(column: str, text: str) -> str:
-    if column != "Verdict":
-        return text
-    verdict = re.sub(r"</?strong>", "", text)
-    kind = next((badge for start, badge in BADGES.items() if verdict.startswith(start)), "open")
-    return f'<strong class="verdict {kind}">{verdict}</strong>'

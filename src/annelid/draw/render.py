@@ -15,9 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.analysis.gait import cycle_marks
 from annelid.analysis.track import nearest_time
-from annelid.draw.canvas import WIDTH_IN, canvas, save
 from annelid.errors import MissingDependency, RunFileError
 from annelid.output import whole_file, with_suffix
 from annelid.simulation.runfile import Run
@@ -27,9 +25,6 @@ if TYPE_CHECKING:
     from annelid.draw.scene import WormScene
 
 FRAME_SUFFIXES = (".png", ".jpg", ".jpeg")
-STRIP_SUFFIXES = (".png", ".pdf", ".svg")
-STRIP_SIZE = (840, 525)
-STRIP_RANGE, STRIP_COLUMNS, STRIP_DPI = (2, 24), 3, 300.0
 VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv", ".gif")
 DEFAULT_CAMERA = "isometric"
 MOST_PICTURES = 200_000  # of a video, which are drawn some 30 a second
@@ -84,64 +79,6 @@ def render_frame(
     with whole_file(path) as draft:
         imageio.v3.imwrite(draft, pixels)
     return path
-
-
-def render_strip(
-    run: Run,
-    path: str | Path,
-    n_frames: int = 6,
-    *,
-    camera: str | None = None,
-    background: str | None = None,
-) -> Path:
-    """Draws one cycle of a 3D worm as frames side by side with their times: the last whole one, or all of a run.
-
-    Args:
-        run: The run.
-        path: File to write; its suffix chooses the format (``.png``, ``.pdf``, ``.svg``).
-        n_frames: Number of frames, evenly spaced in time, 2 to 24.
-        camera: As in `render_frame`.
-        background: As in `render_frame`.
-
-    Returns:
-        The path written.
-
-    Raises:
-        RunFileError: As of `render_frame`, the body is planar, or ``n_frames`` is out of range.
-        RenderingUnavailable: No OpenGL back-end works.
-    """
-    from annelid.draw.overlay import background_of, legend_handle, length_name
-
-    path = with_suffix(path, STRIP_SUFFIXES, "a strip of frames")
-    fewest, most = STRIP_RANGE
-    if not fewest <= n_frames <= most:
-        raise RunFileError(f"{n_frames} frames: a strip has {fewest} to {most}")
-    if run.config.body.is_planar:
-        raise RunFileError("a strip of frames shows a 3D worm, and this one is planar: draw its frames one by one")
-    width, height = STRIP_SIZE
-    with _worm_scene(run, STRIP_SIZE, camera, background, fine=True, words=False) as scene:
-        marks = cycle_marks(run)
-        start, end = marks[-2:] if len(marks) > 1 else scene.times_s[[0, -1]]
-        shown = [nearest_time(run, scene.times_s, t) for t in np.linspace(start, end, n_frames, endpoint=False)]
-        pictures = [scene.picture(frame) for frame in shown]
-        entries, length_m, pixels_per_m = scene.legend, scene.bar_m, scene.pixels_per_m
-    columns = min(n_frames, STRIP_COLUMNS)
-    rows = math.ceil(n_frames / columns)
-    height_in = rows * (WIDTH_IN / columns * height / width + 0.25) + 0.3
-    with canvas(height_in, dark=background == "dark") as figure:
-        panels = figure.subplots(rows, columns, squeeze=False).ravel()
-        for axes in panels:
-            axes.axis("off")
-        for axes, picture, frame in zip(panels, pictures, shown, strict=False):
-            axes.imshow(picture, interpolation="antialiased")
-            axes.set_title(f"{scene.times_s[frame]:.2f} s", fontsize=9.0, pad=3.0)
-        # The camera keeps its distance, so one bar is right for all.
-        bar, ink = [0.96 * width - length_m * pixels_per_m, 0.96 * width], background_of(background or "floor").ink
-        panels[0].plot(bar, [0.94 * height] * 2, color=ink, linewidth=1.6, solid_capstyle="butt")
-        panels[0].text(np.mean(bar), 0.92 * height, length_name(length_m), ha="center", fontsize=7.0, color=ink)
-        handles = [legend_handle(*entry) for entry in entries]
-        figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), fontsize=7.5, handlelength=1.4)
-        return save(figure, path, dpi=STRIP_DPI)
 
 
 def render_video(
@@ -210,7 +147,9 @@ def _scene(
     run: Run, size: tuple[int, int], camera: str | None, background: str | None, *, fine: bool
 ) -> WormScene | PlanarScene:
     if not run.config.body.is_planar:
-        return _worm_scene(run, size, camera, background, fine=fine, words=True)
+        from annelid.draw.scene import WormScene
+
+        return WormScene(run, *size, camera or DEFAULT_CAMERA, fine=fine, background=background or "floor")
     from annelid.draw.overlay import background_of
     from annelid.draw.planar_scene import PlanarScene
 
@@ -219,14 +158,6 @@ def _scene(
     if background is not None:
         background_of(background)
     return PlanarScene(run, *size, dark=background == "dark")
-
-
-def _worm_scene(
-    run: Run, size: tuple[int, int], camera: str | None, background: str | None, *, fine: bool, words: bool
-) -> WormScene:
-    from annelid.draw.scene import WormScene
-
-    return WormScene(run, *size, camera or DEFAULT_CAMERA, fine=fine, background=background or "floor", words=words)
 
 
 @contextmanager

@@ -1,17 +1,15 @@
-"""The runs that lie below a folder: what each is, and removing the files that annelid wrote for it."""
+"""The runs that lie below a folder, and what each is."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
 from annelid.errors import AnnelidError, ConfigError, RunFileError
 from annelid.experiment.outcome import OUTCOME_NAME
-from annelid.simulation.lock import LOCK_NAME, locked
 from annelid.simulation.runfile import FILE_NAME, STATUSES, read_config
 from annelid.textfiles import parse_json
 
@@ -85,30 +83,3 @@ def _own_files(folder: Path, status: str) -> list[Path]:
     if _is_outcome(folder / OUTCOME_NAME):
         files.append(folder / OUTCOME_NAME)
     return [path for path in files if path.is_file() and not path.is_symlink()]
-
-
-def remove(run: Kept) -> None:
-    """Removes the files of a run that `runs_below` listed, and its folder if nothing else is in it.
-
-    Raises:
-        RunFileError: Another process writes there, the run is unreadable, or a file cannot be removed.
-    """
-    if not run.folder.is_dir() or run.folder.is_symlink():
-        raise RunFileError(f"{run.folder} is not there any more")
-    if run.status == UNREADABLE:
-        raise RunFileError(f"{run.folder} is unreadable, so annelid may not have written it: remove it yourself")
-    try:
-        with ExitStack() as stack:
-            # A study locks its own folder, above those of its runs.
-            for above in reversed(run.folder.absolute().parents):
-                if (above / LOCK_NAME).exists():
-                    stack.enter_context(locked(above))
-            stack.enter_context(locked(run.folder))
-            for path in _own_files(run.folder, _kept(run.folder).status):
-                path.unlink()
-    except OSError as error:
-        raise RunFileError(f"cannot remove {error.filename}: {error.strerror}") from None
-    # Where anything else is in it, such as a file of the user's, the folder stays.
-    with suppress(OSError):
-        if {entry.name for entry in run.folder.iterdir()} <= {LOCK_NAME}:
-            run.folder.rmdir()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,7 @@ import numpy as np
 
 from annelid.body.assemble import mjcf_text
 from annelid.config import RunConfig
-from annelid.draw.render import Progress, render_video
+from annelid.draw.render import Progress
 from annelid.errors import MissingDependency, RunFileError
 from annelid.export.page import write_page
 from annelid.export.tables import write_csv_tables, write_matlab, write_parquet_tables
@@ -25,7 +24,6 @@ from annelid.simulation.worm import WormPlant
 
 WINDOW = frozenset({"--from-time", "--to-time"})
 SELECTION = WINDOW | {"--signals", "--every"}
-GIF_FPS = 12.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,16 +118,10 @@ def write_mjcf(run: Run, path: Path) -> Path:
     return write_text(path, mjcf_text(run.config, keyframes))
 
 
-def _video(run: Run, path: Path, progress: Progress, fps: float = 25.0) -> list[Path]:
-    return [render_video(run, path, fps=fps, progress=progress)]
-
-
 for _format in (
     Format("csv", "csv", ".csv", SELECTION, write_csv_tables),
     Format("mat", "run.mat", ".mat", SELECTION, lambda run, path, _: [write_matlab(run, path)]),
     Format("parquet", "parquet", ".parquet", SELECTION, write_parquet_tables, "pyarrow"),
-    Format("mp4", "video.mp4", ".mp4", WINDOW, _video),
-    Format("gif", "video.gif", ".gif", WINDOW, partial(_video, fps=GIF_FPS)),
     Format("html", "report.html", ".html", WINDOW, lambda run, path, progress: [write_page(run, path, progress)]),
     Format("mjcf", "worm.xml", ".xml", frozenset(), lambda run, path, _: [write_mjcf(run, path)], worm=mjcf_text),
 ):

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 import xarray as xr
 
+from annelid.draw.render import Progress
 from annelid.errors import RunFileError, suggest
 from annelid.output import plain_cell, whole_file, write_json
 from annelid.simulation.runfile import Run
@@ -29,8 +30,6 @@ LONGEST_NAME = 63
 """Characters that MATLAB reads of a name."""
 STRUCTS = ("units", "long_name", "dimensions", "labels", "config", "run")
 
-Progress = Callable[[int, int], object]
-"""Called with the steps done, and in all."""
 Table: TypeAlias = "tuple[DataFrame, dict[str, tuple[str, str]]]"
 """Signals of the same dimensions, a column each, and unit and meaning of every column."""
 

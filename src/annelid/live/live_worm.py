@@ -67,6 +67,10 @@ class LiveWorm:
         """
         self._take(load_config(self.config.model_dump(), values))
 
+    def turn(self, knob: Knob, shown: float) -> None:
+        """Changes a field to what a slider shows, as `adjust`."""
+        self.adjust({knob.field: knob.value(shown)})
+
     def _take(self, config: RunConfig) -> None:
         self.simulation = adjusted(self.simulation, _endless(self.config), _endless(config))
         self.config = config

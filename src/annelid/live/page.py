@@ -64,7 +64,7 @@ def export_page(
                 worm.advance(time_s, math.inf)
             moment = history.at(time_s + 0.5 / FRAMES_A_SECOND)
             if moment is not shown:
-                stage.show(moment, follow=True)
+                stage.show(moment)
                 shown = moment
             recording.insert_sleep(1.0 / FRAMES_A_SECOND / speed)
             if progress is not None:

@@ -12,12 +12,12 @@ import numpy as np
 from annelid.config import Knob, RunConfig
 from annelid.draw.canvas import CONTRACTED, RELAXED, segment_colors
 from annelid.draw.figures.network_diagram import by_segment, network_of, role_of
-from annelid.live.live_worm import knobs_of
+from annelid.live.live_worm import LiveWorm, knobs_of
 from annelid.live.network import colors_html, network_html
 from annelid.live.picture import CONTACT_COLOR, SPRING_COLORS, SPRING_RANGE, STRAND_COLORS
-from annelid.live.player import FASTEST, SLOWEST
-from annelid.live.stage import LAYERS
-from annelid.live.view import View
+from annelid.live.player import FASTEST, SLOWEST, Player
+from annelid.live.requests import Requests
+from annelid.live.stage import LAYERS, Stage
 from annelid.morphology import Array
 
 if TYPE_CHECKING:
@@ -100,48 +100,50 @@ def _half_centres(segments: dict[int, list[str]]) -> Plot:
 
 
 class Panel:
-    """The panel's elements; what they change is asked of the loop of a view."""
+    """The panel's elements; what they change is requested of the loop of a view."""
 
     def __init__(
         self,
         server: viser.ViserServer,
-        view: View,
-        speed: float,
+        requests: Requests,
+        player: Player,
+        stage: Stage,
+        config: RunConfig,
         weight_N: float | None,
         legend: str,
-        plots: Mapping[str, Plot] | None = None,
+        plots: Mapping[str, Plot],
     ) -> None:
         """Makes all elements; pokes are measured by the worm's weight on Earth, None where nothing can be poked."""
         gui = self._gui = server.gui
-        self._player = player = view.player
+        self._requests, self._player = requests, player
         gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
         gui.main_panel.dock_right()
         self._status = gui.add_html("")
-        self._transport(view, speed)
+        self._transport()
         self._knobs: dict[Knob, Any] = {}
         self._poke: Any = None
         if player.worm is not None:
-            self._physics(view, player.worm.config, weight_N)
-        network = network_of(view.config, neurons) if (neurons := neurons_of(player.history.names)) else None
+            self._physics(player.worm, weight_N)
+        network = network_of(config, neurons) if (neurons := neurons_of(player.history.names)) else None
         self._n_neurons, self._colors = len(neurons), None
         if network is not None:
             with gui.add_folder("Network, coloured by potential", expand_by_default=len(neurons) <= MOST_NEURONS):
                 gui.add_html(network_html(network))
                 self._colors = gui.add_html("")
-        self._plots = {**(plots or {}), **plots_of(player.history.names)}
+        self._plots = {**plots, **plots_of(player.history.names)}
         self._plot_folder = gui.add_folder(f"{'Signals' if plots else 'Nervous system'}, last 5 s")
         self._chart: Any = None
         with self._plot_folder:
             choice = gui.add_dropdown("plot", list(self._plots), initial_value=next(iter(self._plots)))
-            choice.on_update(lambda event: view.request(self.choose_plot, str(event.target.value)))
+            choice.on_update(self._requesting(self.choose_plot))
         with gui.add_folder("Colours"):
             gui.add_html(legend)
         with gui.add_folder("Shown", expand_by_default=False):
             follow = gui.add_checkbox("follow the worm", initial_value=True)
-            follow.on_update(lambda event: view.request(setattr, view, "follow", bool(event.target.value)))
+            follow.on_update(self._requesting(setattr, stage, "follow"))
             for layer in LAYERS:
                 box = gui.add_checkbox(layer, initial_value=True)
-                box.on_update(_asking(view, view.stage.set_visible, layer))
+                box.on_update(self._requesting(stage.set_visible, layer))
         self.choose_plot(next(iter(self._plots)))
 
     @property
@@ -149,38 +151,46 @@ class Panel:
         """Force of a poke as set, N; 0 where nothing can be poked."""
         return float(self._poke.value) if self._poke is not None else 0.0
 
-    def _transport(self, view: View, speed: float) -> None:
-        gui, player = self._gui, view.player
+    def _transport(self) -> None:
+        gui, player = self._gui, self._player
         living = player.worm is not None
-        buttons = {PLAY: player.toggle, **({NOW: player.go_live} if living else {}), AGAIN: view.restart}
+        buttons = {PLAY: player.toggle, **({NOW: player.go_live} if living else {}), AGAIN: player.restart}
         live_hint = "Live: the present, and on from there. Restart: time zero, with the sliders as they are."
         row = gui.add_button_group("", list(buttons), hint=live_hint if living else "Restart: from the beginning.")
-        row.on_click(lambda event: view.request(buttons[str(event.target.value)]))
+        row.on_click(lambda event: self._requests.add(buttons[str(event.target.value)]))
         self._time = gui.add_slider("time (s)", 0.0, 0.01, 0.01, 0.0, hint="Drag to look at another time.")
-        self._time.on_update(_asking(view, player.seek))
+        self._time.on_update(self._requesting(player.seek))
         hint = "Simulated seconds per second; the worm may not keep up."
-        pace = gui.add_slider("speed", SLOWEST, FASTEST, 0.05, speed, hint=hint)
-        pace.on_update(_asking(view, setattr, player, "speed"))
+        pace = gui.add_slider("speed", SLOWEST, FASTEST, 0.05, player.speed, hint=hint)
+        pace.on_update(self._requesting(setattr, player, "speed"))
 
-    def _physics(self, view: View, config: RunConfig, weight_N: float | None) -> None:
+    def _physics(self, worm: LiveWorm, weight_N: float | None) -> None:
         gui = self._gui
         with gui.add_folder("Physics"):
-            for knob in knobs_of(config):
+            for knob in knobs_of(worm.config):
                 self._knobs[knob] = gui.add_slider(
-                    knob.label, knob.low, knob.high, knob.step, knob.shown(config), hint=knob.hint
+                    knob.label, knob.low, knob.high, knob.step, knob.shown(worm.config), hint=knob.hint
                 )
-                self._knobs[knob].on_update(_asking(view, view.set_knob, knob))
+                self._knobs[knob].on_update(self._requesting(worm.turn, knob))
             if weight_N is not None:
                 hint = "Force of a poke, the worm's weight at first: click on the worm to push it away for 0.15 s."
                 self._poke = gui.add_slider("poke (N)", 0.0, STRONGEST_POKE * weight_N, 0.1, weight_N, hint=hint)
             again = gui.add_button("Reset sliders", hint="Gives every slider above its first value.")
-            again.on_click(lambda _: view.request(self._reset, view))
+            again.on_click(lambda _: self._requests.add(self._reset, worm))
 
-    def _reset(self, view: View) -> None:
-        view.reset_knobs()
-        assert view.player.worm is not None
+    def _reset(self, worm: LiveWorm) -> None:
+        worm.reset_fields()
         for knob, slider in self._knobs.items():
-            slider.value = knob.shown(view.player.worm.config)
+            slider.value = knob.shown(worm.config)
+
+    def _requesting(self, call: Callable[..., Any], *first: Any) -> Callable[[Any], None]:
+        """Requests a call with an element's value as its last argument, if it was the user who changed it."""
+
+        def on_update(event: Any) -> None:
+            if event.client_id is not None:
+                self._requests.add(call, *first, event.target.value)
+
+        return on_update
 
     def choose_plot(self, name: str) -> None:
         """Puts another plot in place of the present one; it is empty until `update`."""
@@ -220,16 +230,6 @@ class Panel:
 def _series(curve: Curve, colors: Sequence[str]) -> Any:
     series: dict[str, Any] = {"label": curve.label, "stroke": colors[curve.number], "points": {"show": False}}
     return series | ({"dash": (6, 4), "width": 1.1} if curve.dashed else {"width": 1.6})
-
-
-def _asking(view: View, call: Callable[..., Any], *first: Any) -> Callable[[Any], None]:
-    """Asks for a call with a slider's value as its last argument, if it was the user who moved it and not `Panel`."""
-
-    def on_update(event: Any) -> None:
-        if event.client_id is not None:
-            view.request(call, *first, event.target.value)
-
-    return on_update
 
 
 def legend_html(arrow_N: float, radius_m: float, *, is_planar: bool = False) -> str:

@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from annelid.config import RunConfig
+from annelid.errors import AnnelidError
 from annelid.live.history import Moment
 from annelid.live.panel import Panel, Plot, legend_html, status_html
 from annelid.live.picture import hit_point, painter_of
 from annelid.live.player import player_of
+from annelid.live.requests import Requests
 from annelid.live.server import LOOPBACK, Server
 from annelid.live.stage import Stage
-from annelid.live.view import View
 from annelid.simulation.runfile import Run
 
 if TYPE_CHECKING:
@@ -30,11 +31,14 @@ PANEL_INTERVAL_S = 0.33  # between two updates of plots, time and status
 PACE_OVER_S = 2.0  # over which the speed that is reached is measured
 
 
-class Show(View):
+class Show:
     """A server with the scene and the panel of one worm, and the loop that keeps them going.
 
     Attributes:
+        player: What is shown when.
+        stage: Where it is seen.
         panel: What is beside the scene.
+        requests: What the loop is to do.
         address: Of the page, with the token that it opens with.
         frames_drawn: Number of pictures sent so far.
     """
@@ -62,19 +66,25 @@ class Show(View):
             RunFileError: The run holds no postures.
         """
         config = source.config if isinstance(source, Run) else source
-        player, anatomy = player_of(source, speed)
-        painter = painter_of(anatomy, config, player.moment)
+        self.player, anatomy = player_of(source, speed)
+        painter = painter_of(anatomy, config, self.player.moment)
+        self.requests = Requests()
         self._ending = threading.Event()
         self._pace: deque[tuple[float, float]] = deque()
+        self._name = config.name
         self._drawn: tuple[Moment, bool] | None = None
         self.frames_drawn = 0
         self._server = Server(host, port)
         self.address = self._server.address
-        super().__init__(config, player, Stage(self._server, config, painter, player.moment))
+        self.stage = Stage(self._server, config, painter, self.player.moment)
         legend = legend_html(painter.arrow_N, painter.radius_m, is_planar=anatomy is None)
-        self.panel = Panel(self._server, self, speed, painter.weight_N, legend, plots)
+        self.panel = Panel(
+            self._server, self.requests, self.player, self.stage, config, painter.weight_N, legend, plots or {}
+        )
         if self.player.worm is not None and painter.weight_N is not None:
-            self._server.scene.on_click()(lambda event: self.request(self.poke, event.ray_origin, event.ray_direction))
+            self._server.scene.on_click()(
+                lambda event: self.requests.add(self.poke, event.ray_origin, event.ray_direction)
+            )
 
     def __enter__(self) -> Self:
         return self
@@ -87,7 +97,7 @@ class Show(View):
         last = panel_due = perf_counter()
         while not self._ending.is_set():
             begun = perf_counter()
-            self.meet_requests()
+            self.requests.meet()
             self.player.tick(min(begun - last, LONGEST_TICK_S), deadline=begun + 1.0 / FRAMES_A_SECOND)
             last = begun
             self._draw()
@@ -105,25 +115,24 @@ class Show(View):
         self._ending.set()
 
     def poke(self, origin_m: tuple[float, ...], direction: tuple[float, ...]) -> None:
-        """Pokes what a line of sight hits, in the page's axes, m."""
+        """Pokes what a line of sight hits, in the page's axes, m; raises `AnnelidError` in the past."""
         worm = self.player.worm
         if worm is None or self.player.stopped:
             return
         if not self.player.at_end:
-            self.notice = "This is the past: press Live and poke the worm again."
-            return
+            raise AnnelidError("This is the past: press Live and poke the worm again.")
         origin, sight = self.stage.to_model(np.asarray(origin_m), np.asarray(direction))
         place = hit_point(self.stage.picture.strands.reshape(-1, 3).astype(float), origin, sight)
         if place is not None:
             worm.poke(place, self.panel.poke_N * sight)
 
     def _draw(self) -> None:
-        wanted = self.player.moment, self.follow
+        wanted = self.player.moment, self.stage.follow
         if wanted == self._drawn:
             return
         self._drawn = wanted
         with self._server.atomic():
-            self.stage.show(self.player.moment, follow=self.follow)
+            self.stage.show(self.player.moment)
         self._server.flush()
         self.frames_drawn += 1
 
@@ -134,12 +143,12 @@ class Show(View):
             self._pace.popleft()
         passed = now - self._pace[0][0]
         pace = (time_s - self._pace[0][1]) / passed if passed > 0 else 0.0
-        parts, below = [f"{time_s:.2f} s"], self.notice
+        parts, below = [f"{time_s:.2f} s"], self.requests.notice
         if player.stopped:
-            below = f"Stopped: {player.stopped}. Move the sliders back and press Restart. {self.notice}"
+            below = f"Stopped: {player.stopped}. Move the sliders back and press Restart. {below}"
         elif not player.playing:
             parts.append("paused")
         else:
             parts.append(f"{max(pace, 0.0):.2f} \N{MULTIPLICATION SIGN} real time")
             parts += [] if player.worm is None or player.at_end else ["(the past)"]
-        return status_html(self.config.name, parts, below)
+        return status_html(self._name, parts, below)

@@ -59,6 +59,7 @@ class Stage:
         picture: What is seen, in the model's axes.
         turn: Rotation from the model's axes to the page's, ``(3, 3)``.
         shift_m: Where the model's origin is in the page, m, ``(3,)``.
+        follow: Whether worm and ground move so that the worm's middle stays on the screen.
     """
 
     def __init__(
@@ -75,7 +76,7 @@ class Stage:
         scene.add_light_ambient("/sky", intensity=2.0)
         scene.add_light_directional("/lamp", intensity=2.0, position=(-3.0, -2.0, 3.0))
         self.turn = upright(config)
-        self.shift_m = np.zeros(3)
+        self.shift_m, self.follow = np.zeros(3), True
         self._root = scene.add_frame(_ROOT, show_axes=False, wxyz=SO3.from_matrix(self.turn).wxyz)
         self._strands, self._rings, self._springs = (
             scene.add_line_segments(f"{_ROOT}/{name}", points, colors, thickness=width, thickness_units="screen")
@@ -113,8 +114,8 @@ class Stage:
         camera.look_at = target
         camera.position = target - distance * sight
 
-    def show(self, moment: Moment, *, follow: bool) -> None:
-        """Shows another moment; ``follow`` moves worm and ground so that the worm's middle stays on the screen."""
+    def show(self, moment: Moment) -> None:
+        """Shows another moment."""
         self.picture = picture = self._painter.paint(moment)
         self._strands.points = picture.strands
         self._rings.points = picture.rings
@@ -123,7 +124,7 @@ class Stage:
         self._springs.colors = picture.spring_colors
         self._contacts.points = picture.contacts
         self._place_geoms()
-        shift = self.turn @ (self._first_middle - picture.middle) if follow else np.zeros(3)
+        shift = self.turn @ (self._first_middle - picture.middle) if self.follow else np.zeros(3)
         if self._level:
             # A worm that breathes is not to make the ground bob.
             shift[2] = 0.0

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from annelid.arena.course import Bore, Course
     from annelid.arena.surface import Shape, Surface
     from annelid.morphology import MeshGeometry
-    from annelid.protocols import Array, Controller, Plant, Steering, Values
+    from annelid.protocols import Array, Controller, Plant, Sensation, Values
 
 MOST_SAMPLES = 10_000_000
 
@@ -89,8 +89,13 @@ class ControllerKind(Checked, Kind):
 
 
 class TurningKind(Checked, Kind):
-    """Base of the sections that scale the two sides of a worm with half-rings."""
+    """Base of the sections that scale the two sides of a worm with half-rings, by a rule with a state of its own.
 
+    Attributes:
+        senses: What the rule senses, names in `annelid.control.SENSED`.
+    """
+
+    senses: ClassVar[tuple[str, ...]] = ()
     registry: ClassVar[Registry[type[Any]]] = Registry("turning.kind", "annelid.control.turning")
     default: ClassVar[str] = "constant"
 
@@ -108,13 +113,20 @@ class TurningKind(Checked, Kind):
         return Goals()
 
     @abstractmethod
-    def build(self, n_segments: int, control_timestep_s: float) -> Steering:
-        """Builds the steering in its initial state.
+    def at_start(self) -> dict[str, Any]:
+        """Returns the state with which both sides are whole."""
 
-        Args:
-            n_segments: Segments of the worm.
-            control_timestep_s: Control step, s.
+    @abstractmethod
+    def advance(self, now: dict[str, Any], sensation: Sensation, timestep_s: float) -> None:
+        """Takes one control step, in place.
+
+        Raises:
+            ConfigError: The body cannot sense what the rule needs.
         """
+
+    @abstractmethod
+    def scales(self, now: dict[str, Any], n_segments: int) -> Array:
+        """Returns what is left of the activation of each half, in [0, 1], ``(n_segments, 2)``: left and right half."""
 
 
 class BodyKind(Checked, Kind):

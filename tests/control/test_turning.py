@@ -284,12 +284,6 @@ class TestRefusals:
         with pytest.raises(ConfigError, match=r"turning.kind = 'touch' needs a left and a right half"):
             load_config(preset, {"turning.kind": "touch"})
 
-    def test_a_modulation_beyond_one_and_a_course_without_waypoints(self) -> None:
-        with pytest.raises(ConfigError, match=r"turning.modulation = 1.5: must be at most 1"):
-            load_config("riddle2025", {"turning.modulation": 1.5})
-        with pytest.raises(ConfigError, match=r"turning.waypoints must be given"):
-            load_config("riddle2025", {"turning.kind": "course"})
-
     @pytest.mark.parametrize("kind", ["heading", "touch"])
     def test_a_body_that_does_not_feel_what_is_needed(self, kind: str) -> None:
         section = check_config({"body": {"rings": {"layout": "halves"}}, "turning": {"kind": kind}}).turning

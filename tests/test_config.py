@@ -289,7 +289,7 @@ def test_names_that_have_moved_are_found_with_a_warning() -> None:
 
     for package, name in (
         (annelid.analysis, "detect_slip"),
-        (annelid.nervous, "phase_chain"),
+        (annelid.nervous, "PhaseStepper"),
         (annelid.nervous, "import_network"),
         (annelid.export, "Firmware"),
         (annelid.export, "lems_text"),

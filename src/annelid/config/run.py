@@ -127,7 +127,6 @@ class BodyKind(Checked, Kind):
         needs_arena: Whether it stands on an arena, the default one where none is given.
         is_planar: Whether it moves in one plane, and is drawn from its side.
         has_skin: Whether the sides of its segments feel touch.
-        touches_ground: Whether anything of the body bears on a ground or a wall.
         can_be_pushed: Whether a trial may push it.
         is_papers: Whether it is in the paper's own formulation, which others are compared with.
         has_rigid_crossings: Whether the two strands of a crossing share a point.
@@ -142,7 +141,6 @@ class BodyKind(Checked, Kind):
     needs_arena: ClassVar[bool] = False
     is_planar: ClassVar[bool] = False
     has_skin: ClassVar[bool] = False
-    touches_ground: ClassVar[bool] = True
     can_be_pushed: ClassVar[bool] = False
     segments_field: ClassVar[str] = "body.n_segments"
     frame_size: ClassVar[tuple[int, int]] = (1280, 800)

@@ -32,6 +32,27 @@ def test_examples_are_short_and_say_what_they_are() -> None:
     assert [name for name, text in texts.items() if len(text.splitlines()) > MOST_LINES] == []
 
 
+SHORT: dict[str, tuple[tuple[object, ...], str, str]] = {
+    "round_a_post": ((1.0,), "after 1 s", "track.png"),
+    "through_a_taper": ((1.0,), "0.183", ""),
+    "resume_a_run": ((0.4,), "are the whole, bit for bit", ""),
+    "pipe_of_your_own": ((0.4,), "inside", "crawler.png"),
+    "scatter_over_seeds": ((0.005, 0.4, range(2)), "seed 1: too short", ""),
+    "rigid_tube_and_soft_worms": ((), "", "tube.png"),
+}
+"""Examples by name: what they are given beside a folder, what they say, and what they draw there."""
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name == "through_a_taper")) for name in SHORT]
+)
+def test_an_example_says_and_draws_its_result(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    given, says, drawn = SHORT[name]
+    example(name).main(tmp_path / drawn if name.startswith("rigid") else tmp_path, *given)
+    assert says in capsys.readouterr().out
+    assert not drawn or (tmp_path / drawn).stat().st_size > 10_000
+
+
 def test_setae_make_travel_of_breathing(tmp_path: Path) -> None:
     breathing = example("breathing_on_setae")
     even = breathing.travel_m(0.6, None, 2.0, tmp_path / "even")
@@ -48,20 +69,6 @@ def test_a_wave_that_feels_the_ground_goes_round(tmp_path: Path) -> None:
     assert numbers.full_cycles >= 1
     assert numbers.travel_m is not None
     assert numbers.travel_m > 0.1
-
-
-def test_the_course_is_drawn(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    example("round_a_post").main(tmp_path, 1.0)
-    assert (tmp_path / "track.png").stat().st_size > 10_000
-    assert "after 1 s" in capsys.readouterr().out
-
-
-@pytest.mark.slow
-def test_the_way_through_a_taper_is_laid_side_by_side(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    example("through_a_taper").main(tmp_path, 1.0)
-    table = capsys.readouterr().out
-    assert "adaptive" in table
-    assert "0.183" in table, "the bore and the clearance where the worm starts"
 
 
 @pytest.mark.slow
@@ -133,11 +140,6 @@ def test_the_load_frame_is_laid_over_the_measured_one(tmp_path: Path, capsys: py
     assert 0.5 < float(capsys.readouterr().out.split()[0]) < 10.0
 
 
-def test_two_parts_of_a_run_are_the_whole(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    example("resume_a_run").main(tmp_path, 0.4)
-    assert "are the whole, bit for bit" in capsys.readouterr().out
-
-
 def test_plain_mujoco_contracts_the_ring(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     plain = example("worm_in_plain_mujoco")
     plain.write(tmp_path / "worm.xml")
@@ -147,21 +149,10 @@ def test_plain_mujoco_contracts_the_ring(tmp_path: Path, capsys: pytest.CaptureF
     assert rings_cm[-1] > 90.0
 
 
-def test_two_gaits_enter_a_pipe_of_ones_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    example("pipe_of_your_own").main(tmp_path, 0.4)
-    assert (tmp_path / "crawler.png").stat().st_size > 10_000
-    assert capsys.readouterr().out.count("inside") == 2
-
-
 def test_a_heading_is_told_as_time_goes_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     example("turn_to_a_heading").main(tmp_path, 30.0, 2.0)
     last = capsys.readouterr().out.splitlines()[-2]
     assert float(last.split()[2]) > 1.0, "to the left"
-
-
-def test_seeds_are_scored_one_by_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    example("scatter_over_seeds").main(tmp_path, 0.005, 0.4, range(2))
-    assert "seed 1: too short" in capsys.readouterr().out
 
 
 def test_all_controllers_drive_the_rod_worm(capsys: pytest.CaptureFixture[str]) -> None:
@@ -178,11 +169,6 @@ def test_one_network_drives_four_bodies(
     monkeypatch.setattr(bodies, "DURATION_S", 0.3)
     bodies.main(tmp_path)
     assert all(name in capsys.readouterr().out or (tmp_path / name).exists() for name in bodies.BODIES)
-
-
-def test_soft_worms_leave_the_rigid_tube(tmp_path: Path) -> None:
-    example("rigid_tube_and_soft_worms").main(tmp_path / "tube.png")
-    assert (tmp_path / "tube.png").stat().st_size > 10_000
 
 
 def test_slip_is_told_for_each_metre(tmp_path: Path) -> None:
@@ -206,4 +192,4 @@ def test_the_worm_crawls_alike_with_its_controller_in_c(tmp_path: Path) -> None:
 
 def test_every_example_is_run_here() -> None:
     own = Path(__file__).read_text(encoding="utf-8")
-    assert [path.stem for path in sorted(EXAMPLES.glob("*.py")) if f'example("{path.stem}")' not in own] == []
+    assert [path.stem for path in sorted(EXAMPLES.glob("*.py")) if f'"{path.stem}"' not in own] == []

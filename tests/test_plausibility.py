@@ -13,16 +13,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-import annelid as package
-from annelid.analysis import rhythm_score
-from annelid.body.estimates import bearable_force_N, rhombus_of, touching_ring_m
+from annelid.body.estimates import bearable_force_N, rhombus_of
 from annelid.body.worm import WormBody
 from annelid.config import LEVELS, RunConfig, arena_names, load_config, preset_names
 from annelid.errors import ConfigError
 from annelid.morphology import helical_mesh, rhombus
 from annelid.plausibility import check, refuse_nonsense, tolerance_window_m
 
-WORMS = [name for name in preset_names() if isinstance(load_config(name).body, WormBody)]
 Changes = dict[str, Any]
 NONSENSE: list[tuple[str, Changes, str]] = [
     ("riddle2025", {"body.mesh.radius_m": 0.05}, "body.rings.length_range_m"),
@@ -201,19 +198,6 @@ def test_a_tolerance_outside_its_window_is_found_until_it_is_set_as_said() -> No
         assert check(of_rods(0.8, 0.1, **{field: float(better[1])})) == []
 
 
-@pytest.mark.slow
-def test_stiff_rods_walk_within_their_window_and_not_below(tmp_path: Path) -> None:
-    coarse = {"body.mesh.elements_per_side": 2, "clock.physics_timestep_s": 0.01, "duration_s": 7.8}
-    coarse["record.signals_interval_s"] = 0.01
-    low_m, high_m = window_of(of_rods(0.8, 0.1))
-    for tolerance_m, walks in (((low_m + high_m) / 2, True), (0.015, False)):
-        config = of_rods(0.8, 0.1, **coarse, **{"sensor.tolerance_m": tolerance_m})
-        found = rhythm_score(package.simulate(config, tmp_path / str(walks), progress=False), 1.75)
-        print(f"{1e3 * tolerance_m:.0f} mm: {found.reason}, period {found.period_s} s")
-        assert found.is_one_wave == walks
-        assert not walks or found.period_s == pytest.approx(2.625, rel=0.01)
-
-
 def test_no_tolerance_is_suggested_where_none_is_known_to_do() -> None:
     [finding] = check(of_rods(2.0, 0.3, 0.36))
     assert "no tolerance is known" in finding.problem
@@ -223,9 +207,3 @@ def test_bodies_that_were_not_measured_have_no_window(subtests: pytest.Subtests)
     for name in ("riddle2023", "riddle2023-fast", "riddle2025", "riddle2025-muscles", "wang"):
         with subtests.test(f"{name!r:.60}"):
             assert tolerance_window_m(load_config(name)) is None
-
-
-def test_a_ring_touches_where_its_strands_do() -> None:
-    body = load_config("riddle2023-rods").body
-    assert isinstance(body, WormBody)
-    assert touching_ring_m(body) == pytest.approx(6 * 0.004)

@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from annelid import Network
 from annelid.config import load_config, parse_assignments, preset_names
 from annelid.errors import UnreadableText
-from annelid.experiment.case import Case
 from annelid.nervous import Channel, GapJunction, Gate, Neuron, Synapse
 from annelid.textfiles import MOST_LEVELS, nested, parse_json, parse_toml, toml_text, toml_value
 
@@ -99,19 +98,6 @@ def test_a_network_is_read_as_it_was_written(data: st.DataObject, name: str, nam
     for part in ("name", "neurons", "initial_mV", "connections", "inputs", "outputs"):
         assert getattr(read, part) == getattr(network, part)
     assert list(read.neurons) == names
-
-
-def test_a_command_line_says_what_was_changed() -> None:
-    import shlex
-
-    changes = {
-        "name": "a 'b' 🪱 $x",
-        "arena.friction": 1000.0,
-        "body.rings": {"kind": "servo", "force_limit_N": [1.0, 2.5]},
-    }
-    words = shlex.split(Case("crawler", changes).command)
-    assert parse_assignments(words[4::2]) == changes
-    assert words[3::2] == ["--set"] * 3
 
 
 def test_fields_by_dotted_path_become_tables() -> None:

@@ -53,7 +53,6 @@ def lems_text(
     *,
     timestep_ms: float = 0.1,
     duration_ms: float = 1000.0,
-    output: str = "potentials.dat",
 ) -> str:
     """Returns a network as LEMS text, with every number to the last bit.
 
@@ -64,7 +63,6 @@ def lems_text(
         currents_nA: Constant currents of inputs, nA, by their names; 0 for the others.
         timestep_ms: Step, ms.
         duration_ms: Duration, ms.
-        output: Name of the file that a simulator writes.
 
     Raises:
         ConfigError: The network has no neurons, a time is not positive, or a name has a character that XML cannot hold.
@@ -93,7 +91,7 @@ def lems_text(
     attributes = {"id": "simulation", "type": "Simulation", "target": "network"}
     times = {"length": f"{duration_ms!r}ms", "step": f"{timestep_ms!r}ms"}
     simulation = ET.SubElement(root, "Component", attributes | times)
-    written = ET.SubElement(simulation, "OutputFile", id="potentials", fileName=output)
+    written = ET.SubElement(simulation, "OutputFile", id="potentials", fileName="potentials.dat")
     for number in range(1, len(network.neurons) + 1):
         ET.SubElement(written, "OutputColumn", id=f"neuron_{number}", quantity=f"neuron_{number}_v")
     ET.indent(root)

@@ -4,7 +4,7 @@ Needs the optional extra: ``pip install "annelid[sns]"``. Traces agree when ours
 ``scheme="toolbox"`` and started with ``gate_start="toolbox"``, at the same time step in ms.
 
 SNS-Toolbox 1.5.2 advances a membrane by ``dt Gm / C`` times the current instead of ``dt / C``, which is right
-only for Gm = 1 uS. The import can keep the traces or the equation; the export keeps the equation.
+only for Gm = 1 uS. The import keeps the traces, with the capacitance C / Gm; the export keeps the equation.
 """
 
 from __future__ import annotations
@@ -12,21 +12,19 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from annelid.errors import ConfigError, MissingDependency, suggest
+from annelid.errors import ConfigError, MissingDependency
 from annelid.nervous import Channel, GapJunction, Gate, Network, Neuron, Synapse
 from annelid.text import numbered
 
 if TYPE_CHECKING:
     from types import ModuleType
 
-Membrane = Literal["as_run", "as_written"]
 
-
-def import_network(toolbox_network: Any, membrane: Membrane = "as_run") -> Network:
+def import_network(toolbox_network: Any) -> Network:
     """Turns any non-spiking SNS-Toolbox network into ours.
 
     Populations become single neurons (``name_0``, ``name_1``, ..); pattern and matrix connections, electrical
@@ -35,8 +33,6 @@ def import_network(toolbox_network: Any, membrane: Membrane = "as_run") -> Netwo
 
     Args:
         toolbox_network: A ``sns_toolbox.networks.Network``.
-        membrane: ``"as_run"``: capacitance C / Gm, so that traces equal those that the toolbox computes;
-            ``"as_written"``: capacitance C, as the neuron's equation says. The same for Gm = 1 uS.
 
     Returns:
         The network, everything in the toolbox's order.
@@ -44,11 +40,9 @@ def import_network(toolbox_network: Any, membrane: Membrane = "as_run") -> Netwo
     Raises:
         MissingDependency: SNS-Toolbox or torch is not installed.
         ConfigError: The network has spiking neurons or synapses, is no toolbox network, has a neuron without
-            leak (for ``"as_run"``), or the membrane is unknown.
+            leak.
     """
     toolbox = _toolbox()
-    if membrane not in get_args(Membrane):
-        raise ConfigError(f"unknown membrane {membrane!r}: {suggest(membrane, get_args(Membrane))}")
     if not isinstance(toolbox_network, toolbox.networks.Network):
         raise ConfigError(f"import_network takes a sns_toolbox.networks.Network, not {type(toolbox_network).__name__}")
     title = toolbox_network.params["name"]
@@ -61,12 +55,10 @@ def import_network(toolbox_network: Any, membrane: Membrane = "as_run") -> Netwo
     network = Network(title)
     for i, name in enumerate(names):
         leak = float(model.g_m[i])
-        if leak == 0.0 and membrane == "as_run":
-            raise ConfigError(
-                f"neuron {name!r} has no leak, so SNS-Toolbox never moves it; import with membrane='as_written'"
-            )
+        if leak == 0.0:
+            raise ConfigError(f"neuron {name!r} has no leak, so SNS-Toolbox never moves it: give it one there")
         neuron = Neuron(
-            capacitance_nF=float(model.c_m[i]) / (leak if membrane == "as_run" else 1.0),
+            capacitance_nF=float(model.c_m[i]) / leak,
             leak_conductance_uS=leak,
             rest_mV=float(model.V_rest[i]),
             bias_nA=float(model.i_b[i]),

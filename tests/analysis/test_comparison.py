@@ -44,9 +44,8 @@ def test_differences_go_segment_by_segment_or_not_at_all(one: list[float | None]
         assert shares == [relative_difference(a, b) for a, b in zip(one, other, strict=True)]
 
 
-@pytest.mark.parametrize(("first", "other"), [(None, 1.0), (1.0, None), (1.0, [1.0]), ([1.0], 1.0)])
-def test_what_cannot_be_compared_is_none(first: float | list[float] | None, other: float | list[float] | None) -> None:
-    assert relative_difference(first, other) is None
+def test_what_cannot_be_compared_is_none() -> None:
+    assert {relative_difference(None, 1.0), relative_difference(1.0, None), relative_difference(1.0, [1.0])} == {None}
 
 
 def test_worms_of_different_kinds_stand_side_by_side(planar_run: Run, rods: Run) -> None:
@@ -63,15 +62,6 @@ def test_worms_of_different_kinds_stand_side_by_side(planar_run: Run, rods: Run)
     written = json.loads(json.dumps(both.to_dict(), allow_nan=False))["configuration"]
     assert written["body.kind"] == ["riddle2022", "worm"]
     assert written["arena.friction"] == [None, 1.0]
-
-
-def test_a_run_differs_from_itself_in_nothing(planar_run: Run) -> None:
-    twice = compare([planar_run, planar_run])
-    assert twice.fields == {}
-    for field, values in twice.numbers.items():
-        assert values[0] == values[1]
-        share = twice.differences(field)[1]
-        assert all(one in (None, 0.0) for one in (share if isinstance(share, list) else [share]))
 
 
 def test_exactly_the_fields_that_were_changed_differ() -> None:

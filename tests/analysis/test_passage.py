@@ -61,19 +61,6 @@ def test_the_bore_is_that_at_the_ring() -> None:
     assert passage.bore_m[1] == pytest.approx(np.full(6, pipe.narrowest_m))
 
 
-@pytest.mark.parametrize(
-    ("pipe", "reach"),
-    [
-        (Pipe(), (0.0, 0.0)),
-        (PIPES[0], (0.2, 0.7)),
-        (PIPES[1], (0.2, 0.2 + 0.4 * pi / 2)),
-        (PIPES[2], (0.2, 0.2 + 1.3 * pi / 2)),
-    ],
-)
-def test_what_bends_or_narrows_lies_between_its_ends(pipe: Pipe, reach: tuple[float, float]) -> None:
-    assert pipe.reach_m() == pytest.approx(reach)
-
-
 def passage_with(middle_m: list[float]) -> Passage:
     middle = np.array(middle_m)
     return Passage(

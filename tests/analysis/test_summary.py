@@ -88,22 +88,6 @@ def test_what_cannot_be_told_is_null_and_never_nan() -> None:
     assert not any(holds_nan(getattr(numbers, field.name)) for field in fields(numbers))
 
 
-def test_an_empty_run_summarises() -> None:
-    numbers = summary(run_of(wave_data().isel(time=slice(0, 0))))
-    assert numbers.order == []
-    assert numbers.duration_s is None
-    json.loads(numbers.to_json())
-
-
-def test_half_rings_add_up_to_a_ring_and_share_a_segment() -> None:
-    data = wave_data()
-    doubled = data.isel(muscle=[0, 0, 1, 1, 2, 2])
-    doubled["ring_length"] = doubled["ring_length"] / 2
-    whole, halves = summary(run_of(data)), summary(run_of(doubled))
-    assert halves.ring_length_min_m == pytest.approx(whole.ring_length_min_m)
-    assert halves.onsets_s == whole.onsets_s
-
-
 def test_published_numbers_stand_beside_the_papers_worm_only() -> None:
     paper = published(check_config({"published": "riddle2023"}))
     assert paper["elongation_first_helix_pp_m"].value == (0.0420, 0.0255, 0.0402)
@@ -177,20 +161,6 @@ def test_forces_are_those_of_every_sample_in_which_the_muscle_itself_is_contract
     numbers = summary(run_of(data))
     assert numbers.segment_force_median_N == [5.5, 7.0, None]
     assert (numbers.contraction_force_median_N, numbers.contraction_force_peak_N) == (7.0, 9.0)
-
-
-def test_both_readings_of_a_written_down_stretch() -> None:
-    rest = np.array([[0.07, 0.08], [0.07, 0.08], [0.07, 0.08]])
-    stretch = np.repeat(rest[None], 4, axis=0)
-    stretch[1, 0] += [0.04, 0.02]  # segment 1 lengthens
-    stretch[2, 0, 0] -= 0.01  # its first helix shortens below rest
-    stretch[3, 2] += [0.00, 0.03]  # segment 3 lengthens away from the first helix
-    data = wave_data().isel(time=slice(4)).drop_dims("sensor")
-    data["stretch_length"] = (("time", "segment", "sensor"), stretch)
-    data["stretch_rest_length"] = (("segment", "sensor"), rest)
-    numbers = summary(run_of(data))
-    assert numbers.elongation_first_helix_pp_m == pytest.approx([0.05, 0.0, 0.0], abs=1e-15)
-    assert numbers.elongation_mean_max_m == pytest.approx([0.03, 0.0, 0.015], abs=1e-15)
 
 
 def test_travel_is_net_and_its_path_goes_forwards_and_backwards() -> None:

@@ -154,7 +154,7 @@ DONE = {
     "compare": typed("compare", "RUN", "RUN", "-o", "both"),
     "draw": typed("draw", "RUN", "-o", "figure7.svg"),
     "export": typed("export", "RUN", "--to", "csv", "-o", "tables"),
-    "study limit-cycle": typed("study", "limit-cycle", "--time", "steps", "-o", "cycle.svg"),
+    "study limit-cycle": typed("study", "limit-cycle", "-o", "cycle.svg"),
     "list presets": typed("list", "presets"),
     "list arenas": typed("list", "arenas"),
     "list numbers": typed("list", "numbers"),

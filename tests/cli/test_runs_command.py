@@ -31,3 +31,10 @@ def test_runs_are_listed_with_what_they_are(annelid: Command, finished: Path) ->
 def test_nothing_is_listed_where_nothing_is(annelid: Command) -> None:
     assert json.loads(annelid("list", "runs", "--json").out) == []
     assert annelid("list", "runs", "elsewhere").exit_code == 2
+
+
+def test_links_are_not_followed(annelid: Command, finished: Path) -> None:
+    outside = Path(shutil.copytree(finished, "outside"))
+    Path("runs").mkdir()
+    Path("runs/linked").symlink_to(outside.resolve())
+    assert json.loads(annelid("list", "runs", "--json").out) == []

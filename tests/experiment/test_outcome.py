@@ -1,12 +1,10 @@
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from annelid.analysis import rhythm_score, summary
 from annelid.experiment.case import Case
 from annelid.experiment.outcome import outcome, read_outcome, write_outcome
 from annelid.simulation.loop import simulate
@@ -37,32 +35,6 @@ def test_an_outcome_is_written_and_read_back_whole(held: Run, tmp_path: Path) ->
     assert read_outcome(tmp_path / "outcome.json") == replace(read, path=tmp_path)
 
 
-def test_an_outcome_is_the_runs_own_numbers(held: Run) -> None:
-    read = outcome(held)
-    assert (read.path, read.message) == (held.path.parent, "")
-    assert read.summary == summary(held)
-    assert read.rhythm == rhythm_score(held)
-    assert read.summary.energy_muscle_work_J is not None
-
-
-def test_another_readers_outcome_is_refused(held: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    write_outcome(outcome(held), tmp_path / "outcome.json")
-    monkeypatch.setattr("annelid.experiment.outcome.code_fingerprint", lambda *_: "other")
-    with pytest.raises(ValueError, match="other code"):
-        read_outcome(tmp_path / "outcome.json")
-
-
-def test_an_incomplete_outcome_is_refused(held: Run, tmp_path: Path) -> None:
-    path = tmp_path / "outcome.json"
-    for loss in ("summary", "rhythm", "holds", "message"):
-        write_outcome(outcome(held), path)
-        content = json.loads(path.read_text())
-        del content[loss]
-        path.write_text(json.dumps(content))
-        with pytest.raises(ValueError, match="no outcome"):
-            read_outcome(path)
-
-
 def test_holds_are_read_at_the_end_of_each_contraction(held: Run) -> None:
     holds = outcome(held).holds
     assert [hold.segment for hold in holds] == [1, 2, 3]
@@ -77,11 +49,6 @@ def test_holds_are_read_at_the_end_of_each_contraction(held: Run) -> None:
 
 def test_an_unfinished_contraction_has_no_reading(cut: Run) -> None:
     assert [hold.segment for hold in outcome(cut).holds] == [1, 2]
-
-
-def test_only_pins_that_can_part_have_a_gap(held: Run, cut: Run) -> None:
-    assert all(hold.pin_gap_m is None for hold in outcome(cut).holds)
-    assert all(hold.pin_gap_m is not None and hold.pin_gap_m > 0.0 for hold in outcome(held).holds)
 
 
 def ring_length_at_end(run: Run, segment: int) -> float:

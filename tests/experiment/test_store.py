@@ -16,7 +16,6 @@ from typing import Any
 import pytest
 
 from annelid.errors import ClusterError, ConfigError, RunKilled
-from annelid.experiment import store as module
 from annelid.experiment.case import Case
 from annelid.experiment.executors import Processes
 from annelid.experiment.outcome import OUTCOME_NAME, Outcome
@@ -200,31 +199,6 @@ def test_a_killed_process_costs_its_own_call_and_computes_on_one_thread(tmp_path
         assert once.result(60) == "1"
         with pytest.raises(RunKilled, match="its worker died 3 times"):
             ever.result(60)
-
-
-def die_at_seed_5(key: str, config_json: str, *words: str) -> bytes | None:
-    """Attempts a run, but is killed by that of seed 5."""
-    if json.loads(config_json)["seed"] == 5:
-        os._exit(1)
-    return attempt(key, config_json, *words)
-
-
-@pytest.mark.slow
-def test_a_run_that_kills_its_workers_is_a_row_and_is_tried_again_by_the_next_call(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(module, "attempt", die_at_seed_5)
-    cases = [*(planar(seed) for seed in (4, 5, 6)), IMPOSSIBLE]
-    with Processes(2) as two:
-        store = Store(tmp_path, two)
-        done = store.finish(cases, "runs")
-    assert [one.status for one in done] == ["complete", "failed", "complete", "failed"]
-    assert "died 3 times" in done[1].reason
-    assert {path.name for path in folders(store)} == {one.outcome.path.name for one in done if one.outcome is not None}
-    monkeypatch.undo()
-    here = Here()
-    assert len(Store(tmp_path, here).compute(cases[:-1])) == 3
-    assert here.keys == [case_key(planar(5))]
 
 
 INTERRUPTED = """

@@ -23,7 +23,6 @@ from annelid.experiment.sweep import (
     Plan,
     Sweep,
     checked_sentence,
-    failures,
     flattened,
     plan_of,
     results_table,
@@ -202,16 +201,6 @@ def test_the_dataset_is_labelled_and_every_run_in_it_once(done: Sweep) -> None:
     assert data.attrs["n_failed"] == 8
 
 
-def test_failed_runs_are_listed_with_their_reason(done: Sweep) -> None:
-    data = done.data
-    bad = data.isel({"body.gain": [1, 2]})
-    assert set(bad.status.values.ravel()) == {"failed"}
-    assert all("overshoot" in reason for reason in bad.reason.values[0].ravel())
-    assert all("body.gain = -1.0" in reason for reason in bad.reason.values[1].ravel())
-    assert bad.period_s.isnull().all()
-    assert sorted(number for _, numbers in failures(done) for number in numbers) == list(range(4, 12))
-
-
 def test_results_are_written_and_read_back_alike(done: Sweep) -> None:
     data = done.data
     paths = write_results(done)
@@ -223,26 +212,6 @@ def test_results_are_written_and_read_back_alike(done: Sweep) -> None:
     assert len(paths[1].read_text().splitlines()) == 13
     assert shown_numbers(done)[0] == "ring_length_min_m"
     assert results_table(done).row_count == 4
-
-
-def test_a_second_sweep_computes_what_is_missing_only(tmp_path: Path) -> None:
-    def mtimes() -> dict[str, int]:
-        return {path.parent.name: path.stat().st_mtime_ns for path in tmp_path.glob(f"out/runs/*/{FILE_NAME}")}
-
-    sobol = {"preset": "riddle2022-planar", "set": {"duration_s": 0.1}, "vary": RANGES, "design": "sobol"}
-    few = annelid.sweep({**sobol, "samples": 2}, tmp_path / "out")
-    before = mtimes()
-    more = annelid.sweep({**sobol, "samples": 3}, tmp_path / "out")
-    after = mtimes()
-    assert (len(before), len(after)) == (2, 3)
-    assert before.items() <= after.items()
-    assert more.run.values[:2].tolist() == few.run.values.tolist()
-    assert more[GATE].dims == ("sample",)
-    assert (
-        annelid.sweep(load_study({**sobol, "samples": 3}), tmp_path / "out")
-        .drop_vars("real_time_factor")
-        .equals(more.drop_vars("real_time_factor"))
-    )
 
 
 def test_numbers_alone_may_be_kept_and_chosen(tmp_path: Path) -> None:

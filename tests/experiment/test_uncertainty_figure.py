@@ -1,13 +1,12 @@
 from __future__ import annotations
 
 from math import nan, sqrt
-from pathlib import Path
 
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from annelid.draw.figures.experiments import _draw_nested, uncertainty_figure
+from annelid.draw.figures.experiments import _draw_nested
 
 
 def test_bars_are_nested_and_end_at_the_root_of_the_sum_of_squares() -> None:
@@ -31,10 +30,3 @@ def test_a_tiny_error_does_not_blow_up_the_axis() -> None:
     axes = Figure().subplots()
     _draw_nested(axes, np.array([2.631]), {"a": np.array([1e-9]), "b": np.array([nan]), "c": np.array([0.0])})
     assert np.ptp(axes.get_ylim()) >= 0.02 * 2.631 * (1 - 1e-9)
-
-
-@pytest.mark.parametrize("value", [2.6, None])
-def test_a_picture_is_written_whether_or_not_there_is_a_value(value: float | None, tmp_path: Path) -> None:
-    names = ("elongation_mean_max_m.1", "period_s", "travel_m")
-    rows = {name: {"value": value, "parameters": 0.1, "time_step": None, "elements": None} for name in names}
-    assert uncertainty_figure(rows, tmp_path / "u.png").read_bytes().startswith(b"\x89PNG")

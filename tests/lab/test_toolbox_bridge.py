@@ -100,9 +100,6 @@ def test_everything_we_can_say_survives_the_export():
     inputs = np.random.default_rng(0).uniform(-15, 15, (2000, 2))
     assert_same_traces(network, exported, inputs, 0.5)
     assert_same_traces(import_network(exported), exported, inputs, 0.5)
-    # The membrane as the toolbox's file says it: C Gm is what the export wrote.
-    written = import_network(exported, membrane="as_written").neurons
-    assert [written[name].capacitance_nF for name in written] == [2.0, 5.0, 12.0]
 
 
 @needs_toolbox
@@ -168,28 +165,17 @@ def test_arithmetic_networks_of_the_toolbox(subtests: pytest.Subtests) -> None:
 
 
 @needs_toolbox
-def test_spiking_networks_are_refused():
+def test_what_cannot_come_over_is_refused() -> None:
     net = networks.Network(name="spikes")
     net.add_neuron(neurons.SpikingNeuron())
     with pytest.raises(ConfigError, match="'spikes' has spiking"):
         import_network(net)
-
-
-@needs_toolbox
-def test_a_neuron_without_leak_comes_over_only_as_written():
     net = networks.Network(name="integrator")
     net.add_neuron(neurons.NonSpikingNeuron(membrane_conductance=0.0), name="a")
     with pytest.raises(ConfigError, match="'a' has no leak"):
         import_network(net)
-    assert import_network(net, membrane="as_written").neurons["a"].leak_conductance_uS == 0.0
-
-
-@needs_toolbox
-def test_foreign_objects_and_unknown_membranes_are_refused():
     with pytest.raises(ConfigError, match="not Network"):
         import_network(peristalsis_network(3))
-    with pytest.raises(ConfigError, match="did you mean 'as_run'"):
-        import_network(networks.Network(), membrane="as_ran")  # type: ignore[arg-type]
 
 
 def two_neurons(**properties) -> Network:

@@ -67,7 +67,7 @@ def test_frequency_stays_monotone_when_the_constants_change(subtests: pytest.Sub
 
 
 def test_drive_1_takes_over_its_share_of_the_current_at_the_threshold() -> None:
-    g, d = PAPER.conductances, drive_conductance_uS(share=0.3)
+    g, d = PAPER.conductances, drive_conductance_uS()
     channel = PAPER.sodium_channel
     sodium = channel.conductance_uS * float(channel.instant_gates[0].steady(0.0)) * channel.reversal_mV
 

@@ -13,7 +13,7 @@ import pytest
 from annelid.errors import ConfigError
 from annelid.nervous import Network, Neuron, Stepper, add_half_centre, add_hold
 from annelid.nervous.neurons import Array
-from annelid.nervous.robust import ROLES, RobustParameters, robust_network, yielding_hold
+from annelid.nervous.robust import ENTRAINMENT, ROLES, RobustParameters, robust_network, yielding_hold
 
 BLOCK_MS = 10
 TURN_MS = RobustParameters().turn_ms
@@ -141,7 +141,7 @@ def test_the_turn_is_the_designed_one_and_the_flip(turn_ms: float, n: int) -> No
 
 def test_the_sensor_speeds_up_and_slows_down_within_its_bounds() -> None:
     """A segment that lengthens in its turn hands over earlier; one that lacks its usual stretch, later."""
-    n, share, n_turns = 4, RobustParameters().entrainment, 40
+    n, n_turns = 4, 40
     stepper = stepper_of(n, 3)
 
     def signal(block: int, trace: Array) -> Array:
@@ -154,26 +154,14 @@ def test_the_sensor_speeds_up_and_slows_down_within_its_bounds() -> None:
         float(np.mean(np.diff([time for time, _ in onsets(late[:, copy])]))) for copy in range(3)
     )
     assert lengthening < nothing < missing
-    bound = 2.0 * share / log(2.0) + 0.01
+    bound = 2.0 * ENTRAINMENT / log(2.0) + 0.01
     assert all(abs(turn / nothing - 1.0) <= bound for turn in (lengthening, missing))
-
-
-def test_without_entrainment_the_sensor_does_nothing() -> None:
-    parameters = RobustParameters(entrainment=0.0)
-    traces = [
-        record(stepper_of(3, parameters=parameters), 3000.0, adversary(kind, (1, 3), 0))
-        for kind in ("off", "telegraph")
-    ]
-    assert np.array_equal(traces[0], traces[1])
 
 
 def test_bad_parameters_are_refused(subtests: pytest.Subtests) -> None:
     for change, words in (
         ({"bifurcation_mV": 0.01}, "bifurcation_mV must be negative"),
         ({"turn_ms": 0.0}, "turn_ms must be positive"),
-        ({"entrainment": -0.1}, "entrainment must be at least 0"),
-        ({"push_nA": 0.5}, "push_nA = 0.5 must be between"),
-        ({"push_nA": 40.0}, "push_nA = 40 must be between"),
     ):
         with subtests.test(f"{change!r:.60}"), pytest.raises(ConfigError, match=words):
             replace(RobustParameters(), **change)

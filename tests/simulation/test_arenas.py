@@ -17,7 +17,7 @@ from annelid.protocols import Array
 from annelid.simulation.ground import facing
 from annelid.simulation.loop import simulate
 from annelid.simulation.stepping import build_controller
-from annelid.simulation.worm import WormPlant, compile_worm
+from annelid.simulation.worm import WormPlant
 
 RODS = "riddle2023-rods"
 RESTLESS = ("floor", "slope", "rails", "steps", "rough", "pipe.bend")
@@ -217,10 +217,3 @@ def test_a_walking_worm_stays_within_its_pipe() -> None:
 def test_a_worm_that_walks_for_half_a_minute_stays_within_its_arena(arena: str) -> None:
     leak, _ = leak_m(arena, 30.0)
     assert leak < 0.001
-
-
-def test_contact_sensors_name_each_part_of_the_skin_once() -> None:
-    anatomy = compile_worm(config("rails"))
-    names = [anatomy.model.sensor(i).name for i in range(anatomy.model.nsensor)]
-    assert len(set(names)) == len(names)
-    assert sum(name.startswith("rail_left") for name in names) == sum(name.startswith("floor") for name in names)

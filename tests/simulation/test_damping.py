@@ -88,17 +88,6 @@ def test_a_worm_in_free_flight_moves_nothing_but_its_parts() -> None:
     assert fine[1] < 0.5 * coarse[1]
 
 
-@pytest.mark.slow
-def test_angular_momentum_is_kept_as_far_as_the_step_resolves_the_motion() -> None:
-    found = {step_s: momenta(2, step_s, 1.0) for step_s in (0.02, 0.01, 0.005, 0.002)}
-    for step_s, (momentum, share) in found.items():
-        print(f"{1e3 * step_s:g} ms: momentum {momentum:.1e} kg m/s, angular momentum {share:.2%} of its parts")
-    assert max(momentum for momentum, _ in found.values()) < 1e-12
-    shares = [share for _, share in found.values()]
-    assert shares == sorted(shares, reverse=True)
-    assert shares[-1] < 0.02
-
-
 def test_a_model_that_moves_by_itself_has_as_many_coordinates_and_no_rows() -> None:
     config = load_config("riddle2023-rods", SMALL)
     plain, plant = build_spec(config).compile(), WormPlant(config).model

@@ -1,13 +1,12 @@
 from __future__ import annotations
 
 import errno
-import io
 import json
 import os
 import shutil
 import tempfile
 from collections.abc import Mapping, Sequence
-from contextlib import closing, suppress
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -82,15 +81,6 @@ def test_a_seed_beyond_64_bits_is_kept(tmp_path: Path) -> None:
     assert int(toy_run(tmp_path, seed=2**70).data.attrs["seed"]) == 2**70
 
 
-def test_folder_and_file_open_alike(run: Run) -> None:
-    for path in (run.path, run.path.parent, str(run.path.parent)):
-        again = open_run(path)
-        assert again.path == run.path
-        assert again.status == "complete"
-        assert again.message == ""
-        xarray.testing.assert_identical(again.data, run.data)
-
-
 def test_a_file_of_a_newer_schema_is_refused(run: Run, tmp_path: Path) -> None:
     shutil.copy(run.path, tmp_path)
     with without_digest(tmp_path / "run.nc") as file:
@@ -101,14 +91,6 @@ def test_a_file_of_a_newer_schema_is_refused(run: Run, tmp_path: Path) -> None:
             RunFileError, match=f"version {SCHEMA_VERSION + 6}, .* none above {SCHEMA_VERSION}: a newer"
         ):
             read(tmp_path)
-
-
-def test_a_schema_that_is_no_number_is_damage(run: Run, tmp_path: Path) -> None:
-    shutil.copy(run.path, tmp_path)
-    with without_digest(tmp_path / "run.nc") as file:
-        file.attrs["schema_version"] = "two"
-    with pytest.raises(RunFileError, match="damaged: its schema_version is not one whole number"):
-        open_run(tmp_path)
 
 
 def test_missing_foreign_and_damaged_files_are_named(run: Run, tmp_path: Path) -> None:
@@ -163,19 +145,6 @@ def test_a_truncated_file_is_refused_wherever_it_is_cut(run: Run, share: float) 
     cut.write_bytes(content[: int(share * len(content))])
     with pytest.raises(RunFileError, match=r"truncated|empty|not a netCDF-4 file"):
         open_run(cut)
-
-
-@given(where=st.floats(0.0, 1.0), junk=st.binary(min_size=1, max_size=64))
-@settings(max_examples=25, derandomize=True)
-def test_damage_gives_a_run_or_a_sentence(run: Run, where: float, junk: bytes) -> None:
-    content = bytearray(run.path.read_bytes())
-    # Metadata come first in the file; damage there is what a reader can stumble over.
-    start = int(where * min(len(content), 20_000))
-    content[start : start + len(junk)] = junk
-    broken = run.path.with_name("broken.nc")
-    broken.write_bytes(content)
-    with suppress(RunFileError):
-        assert open_run(broken).data.sizes["time"] <= 41
 
 
 def test_a_folder_in_use_is_refused_and_left_alone(tmp_path: Path) -> None:
@@ -318,23 +287,6 @@ def test_a_signal_that_is_named_but_not_read_is_refused(tmp_path: Path) -> None:
 
     with pytest.raises(ValueError, match="'kinetic_energy'"):
         simulate(toy_config(), tmp_path / "a", plant=Silent(), controller=ToyController())
-
-
-def test_a_disk_that_takes_a_few_bytes_at_a_time_gets_them_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    class Slow(io.FileIO):
-        def write(self, content: Any) -> int:
-            return super().write(bytes(content[:11]))
-
-    def opened(path: Path, mode: str, buffering: int = -1) -> Any:
-        return Slow(path, mode) if (mode, buffering) == ("r+b", 0) else open(path, mode, buffering)
-
-    monkeypatch.setattr(container, "open", opened, raising=False)
-    slow = toy_run(tmp_path / "slow")
-    monkeypatch.undo()
-    fast = toy_run(tmp_path / "fast")
-    assert slow.status == "complete"
-    for name in ("potential", "stretch_length", "qpos", "activation"):
-        np.testing.assert_array_equal(slow.data[name], fast.data[name])
 
 
 @given(

@@ -6,7 +6,6 @@ import json
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 import pytest
 import xarray
@@ -24,12 +23,6 @@ HARD = {
     "body.strands.linear_density_kg_per_m": 0.036985,
     "arena.contact_time_constant_s": 0.022763,
     "duration_s": 1.0,
-}
-SLACK = {
-    "body.rings.length_range_m": [0.62, 1.3],
-    "clock.physics_timestep_s": 0.02,
-    "record.signals_interval_s": 0.02,
-    "duration_s": 0.3,
 }
 
 
@@ -80,10 +73,7 @@ def test_what_strands_cannot_do_stops_a_run(shown: dict[str, Any], words: str) -
     look = Looked()
     assert look.at(0.1) is None
     assert words in str(look.at(0.2, **shown))
-
-
-def test_a_limit_is_the_users() -> None:
-    assert Looked(changes={"guard.depth_m": 0.1}).at(0.1, depth_m=0.06) is None
+    assert [" at 0.2 s" in warning for warning in look.warnings()] == [True]
 
 
 @pytest.mark.parametrize(
@@ -151,39 +141,16 @@ def test_what_was_kept_is_restored() -> None:
     assert all(np.array_equal(states[0][name], states[1][name]) for name in states[0])
 
 
-STOPPED: list[tuple[str, dict[str, Any]]] = [
-    (
-        "riddle2023-rods",
-        {
-            "arena.friction": 0.234318,
-            "arena.gravity_m_per_s2": 1.028906,
-            "body.strands.young_modulus_Pa": 4707829109,
-            "body.springs.stiffness_N_per_m": 0.668855,
-            "body.springs.tension_only": True,
-            "body.mesh.n_helices": 16,
-            "body.mesh.angular_rate_rad_per_m": 6.686077,
-            "clock.physics_timestep_s": 0.001,
-            "body.formulation.edge_time_constant_s": 0.002174,
-            "duration_s": 2.0,
-        },
-    ),
-    (
-        "riddle2023",
-        {
-            "arena.gravity_m_per_s2": 20.141072,
-            "body.mesh.n_helices": 8,
-            "body.rings.peak_force_N": 615.445477,
-            "body.strands.damping_time_s": 0.995,
-            "duration_s": 0.4,
-        },
-    ),
-]
-
-
-@pytest.mark.parametrize(("preset", "changes"), STOPPED)
-def test_a_ring_that_collapses_stops_the_run(preset: str, changes: dict[str, Any], tmp_path: Path) -> None:
+def test_a_ring_that_collapses_stops_the_run(tmp_path: Path) -> None:
+    changes = {
+        "arena.gravity_m_per_s2": 20.141072,
+        "body.mesh.n_helices": 8,
+        "body.rings.peak_force_N": 615.445477,
+        "body.strands.damping_time_s": 0.995,
+        "duration_s": 0.4,
+    }
     with pytest.raises(SimulationStopped, match=r"below the limit of .* m at which its crossings touch"):
-        simulate(load_config(preset, changes), tmp_path, progress=False)
+        simulate(load_config("riddle2023", changes), tmp_path, progress=False)
     run = open_run(tmp_path)
     assert run.status == "stopped_by_guard"
     assert any(warning.startswith("the ring of segment 1 was 0.0") for warning in run.warnings)
@@ -217,33 +184,3 @@ def test_rings_that_hardly_close_are_told_once_muscles_were_active_for_long() ->
     assert [each.startswith("no ring was shortened by more than 1 %") for each in looked.warnings(0.6)] == [True]
     looked.at(0.8, activation=on, **(weak | {"ring_length_m": np.full(looked.n, 0.9)}))
     assert looked.warnings(0.8) == ()
-
-
-def test_a_body_that_stretches_manyfold_is_told() -> None:
-    looked = Looked()
-    looked.at(0.1, spring_length_m=np.full(42, 0.25))
-    (warning,) = looked.warnings()
-    assert "an axial spring was 0.25 m long at 0.1 s, 3.3 times" in warning
-
-
-def test_a_cable_that_stays_slack_is_told(tmp_path: Path) -> None:
-    run = simulate(load_config("wang", SLACK), tmp_path, progress=False)
-    assert any(warning.startswith("the actuators of segment 1 pulled with no force") for warning in run.warnings)
-
-
-@pytest.mark.slow
-def test_a_resumed_run_has_the_warnings_of_a_whole_one(tmp_path: Path) -> None:
-    others: tuple[dict[str, Any], ...] = ({}, {"sensor.tolerance_m": 0.05}, {"body.rings.length_range_m": [0.62, 0.96]})
-    configs = [load_config("wang", SLACK | other) for other in others]
-    single = [simulate(config, tmp_path / f"single{i}", progress=False) for i, config in enumerate(configs)]
-    assert len({run.warnings for run in single}) == 3
-    half = simulate(load_config("wang", SLACK | {"duration_s": 0.16}), tmp_path / "half", progress=False)
-    assert simulate(configs[0], tmp_path / "rest", resume=half, progress=False).warnings == single[0].warnings
-
-
-def test_a_planar_run_and_a_file_of_before_have_no_warnings(tmp_path: Path) -> None:
-    run = simulate(load_config("riddle2022-planar", {"duration_s": 0.05}), tmp_path, progress=False)
-    assert run.warnings == ()
-    with h5py.File(run.path, "r+") as file:
-        del file["warnings"], file.attrs["schema_version"]
-    assert open_run(tmp_path).warnings == ()

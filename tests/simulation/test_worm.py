@@ -116,16 +116,6 @@ def test_the_soft_pins_part_and_the_guard_watches_them(monkeypatch: pytest.Monke
     assert "gap between the pinned strands" in alarm
 
 
-def test_half_rings_on_one_side_bend_the_worm() -> None:
-    plant = WormPlant(config(**{"body.rings.layout": "halves"}))
-    plant.reset(0)
-    assert plant.n_muscles == 6
-    advance(plant, np.array([0.6, 0.0] * 3), 0.4)
-    felt = plant.step(np.zeros(6))
-    left, right = felt.ring_length_m[0::2], felt.ring_length_m[1::2]
-    assert np.all(left < right)
-
-
 def test_the_engine_s_warnings_become_alarms_and_no_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -22,13 +22,12 @@ from annelid.draw.figures.network_diagram import (
     place_neurons,
     route_connections,
 )
-from annelid.errors import ConfigError
 from annelid.nervous import Network
 from annelid.nervous.neurons import GapJunction, Neuron, Synapse, persistent_sodium
 from annelid.nervous.peristalsis import peristalsis_network
 from annelid.nervous.robust import robust_network
 from annelid.nervous.tables import effect_of
-from annelid_studies.riddle2023.figures import muscle_surface, planar_models, robot_lengths
+from annelid_studies.riddle2023.figures import muscle_surface, robot_lengths
 
 
 def assert_two_good_files(png: Path) -> None:
@@ -41,44 +40,6 @@ def assert_two_good_files(png: Path) -> None:
     # Nothing is cut off at the edges.
     assert white[[0, -1]].all()
     assert white[:, [0, -1]].all()
-
-
-def lengths_of_pieces(outline: np.ndarray) -> np.ndarray:
-    return np.linalg.norm(np.diff(outline, axis=1), axis=2)
-
-
-# Figure 1
-
-
-def outline_of(preset: str) -> np.ndarray:
-    return planar_models.contracted_outline(load_config(preset, {"body.n_segments": 3}), 1)
-
-
-def test_the_kinematic_plant_s_outline_obeys_the_rhombus_and_moves_no_neighbour() -> None:
-    outline = outline_of("riddle2022-planar")
-    height, length = 2 * outline[:, 1, 1], outline[:, 2, 0] - outline[:, 0, 0]
-    assert height == pytest.approx([0.11, 0.065, 0.11], abs=1e-6)
-    assert height**2 + length**2 == pytest.approx(4 * 0.073**2, rel=1e-12)
-
-
-@pytest.mark.parametrize(("preset", "n_corners"), [("daltorio2013", 3), ("boxerbaum2012", 5)])
-def test_the_other_plants_outlines_keep_their_sides_join_and_draw_neighbours_along(preset: str, n_corners: int) -> None:
-    config = load_config(preset, {"body.n_segments": 3})
-    outline = outline_of(preset)
-    assert outline.shape == (3, n_corners, 2)
-    assert lengths_of_pieces(outline).sum(axis=1) == pytest.approx(2 * config.body.side_m)  # type: ignore[union-attr]
-    assert outline[1:, 0] == pytest.approx(outline[:-1, -1])
-    assert outline[0, 0] == pytest.approx([0.0, 0.0])
-    height = outline[:, n_corners // 2, 1]
-    assert height[1] < 0.8 * height[0]
-    assert height[0] == pytest.approx(height[2], rel=0.02)
-
-
-def test_figure_1(tmp_path: Path) -> None:
-    assert "Boxerbaum" in planar_models.figure_1_planar_models(tmp_path / "figure_1")
-    assert_two_good_files(tmp_path / "figure_1.png")
-    with pytest.raises(ConfigError, match="3D"):
-        planar_models.contracted_outline(load_config("riddle2023-rods"), 1)
 
 
 # Figure 5

@@ -184,26 +184,20 @@ class CallableController:
         controller = CallableController(lambda s: 0.5 + 0.5 * np.sin(s.time_s - np.arange(3)), n_muscles=3)
     """
 
-    def __init__(
-        self, function: Callable[[Sensation], ArrayLike], n_muscles: int, on_reset: Callable[[int], None] | None = None
-    ) -> None:
+    def __init__(self, function: Callable[[Sensation], ArrayLike], n_muscles: int) -> None:
         """Wraps a function.
 
         Args:
             function: Takes the present `Sensation`; returns activation in [0, 1], shape ``(n_muscles,)``, or
                 one number for all muscles. Called once per control step.
             n_muscles: Number of muscles of the worm.
-            on_reset: Called with the seed at every reset, for functions that keep a state.
         """
         self.name = getattr(function, "__name__", type(function).__name__)
         self._function = function
         self._n_muscles = n_muscles
-        self._on_reset = on_reset
 
     def reset(self, seed: int) -> None:
-        """Passes the seed on to ``on_reset``."""
-        if self._on_reset is not None:
-            self._on_reset(seed)
+        """Does nothing: what keeps a state is a class of its own."""
 
     def step(self, sensation: Sensation) -> Array:
         """Calls the function and checks what it returns.

@@ -13,10 +13,6 @@ from annelid.experiment.outcome import OUTCOME_NAME
 from annelid.simulation.runfile import FILE_NAME, STATUSES, read_config
 from annelid.textfiles import parse_json
 
-PICTURES = ("figure7.png", "frame.png", "video.mp4")
-"""What `annelid run` draws into a run's folder."""
-UNREADABLE = "unreadable"
-
 
 @dataclass(frozen=True, slots=True)
 class Kept:
@@ -28,7 +24,7 @@ class Kept:
     duration_s: float | None
     """Simulated time that was reached."""
     size_bytes: int
-    """Size of the files that annelid wrote there."""
+    """Size of the files in the folder."""
     changed: str
     """When the newest of them was written, UTC."""
     status: str
@@ -43,15 +39,15 @@ def runs_below(root: Path) -> Iterator[Kept]:
         # Hidden folders are attempts of studies that still go on or were killed.
         below[:] = sorted(entry for entry in below if not entry.startswith("."))
         if FILE_NAME in files or (OUTCOME_NAME in files and _is_outcome(Path(name) / OUTCOME_NAME)):
-            yield _kept(Path(name))
+            yield _kept(Path(name), files)
 
 
-def _kept(folder: Path) -> Kept:
+def _kept(folder: Path, files: list[str]) -> Kept:
     import xarray
 
     preset = duration_s = None
     status = "outcome only"
-    if (folder / FILE_NAME).exists():
+    if FILE_NAME in files:
         try:
             preset = read_config(folder).name
             # Not `open_run`, which would load all of a large file.
@@ -60,10 +56,9 @@ def _kept(folder: Path) -> Kept:
                 duration_s = float(data["time"][n_samples - 1]) if n_samples else 0.0
                 status = STATUSES[int(data["status_code"])]
         except (RunFileError, OSError, KeyError, IndexError, ValueError):
-            status = UNREADABLE
-    states = [path.lstat() for path in _own_files(folder, status)]
-    newest = max((state.st_mtime for state in states), default=folder.stat().st_mtime)
-    changed = datetime.fromtimestamp(newest, UTC).isoformat(timespec="seconds")
+            status = "unreadable"
+    states = [(folder / file).lstat() for file in files]
+    changed = datetime.fromtimestamp(max(state.st_mtime for state in states), UTC).isoformat(timespec="seconds")
     return Kept(folder, preset, duration_s, sum(state.st_size for state in states), changed, status)
 
 
@@ -74,12 +69,3 @@ def _is_outcome(path: Path) -> bool:
     except (AnnelidError, OSError, ValueError):
         return False
     return isinstance(content, dict) and {"reader", "summary", "rhythm"} <= content.keys()
-
-
-def _own_files(folder: Path, status: str) -> list[Path]:
-    """Returns the files that annelid wrote; nothing shows it for those of an unreadable run."""
-    names = () if status in (UNREADABLE, "outcome only") else (FILE_NAME, *PICTURES)
-    files = [folder / name for name in names]
-    if _is_outcome(folder / OUTCOME_NAME):
-        files.append(folder / OUTCOME_NAME)
-    return [path for path in files if path.is_file() and not path.is_symlink()]

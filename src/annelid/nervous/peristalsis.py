@@ -23,7 +23,7 @@ ROLES = ("contraction", "expansion", "sensory", "relay")
 DRIVE_NEURON = "descending"
 """Name of the neuron of a descending drive; its input is called ``drive``."""
 DRIVE_SHARE = 0.3
-"""Share of the current that balances inhibition at U = 0 which drive 1 takes over; chosen by us."""
+"""Share of the inhibiting current at U = 0 that drive 1 takes over, ``g_D E_ex / (g_CPG |E_inh|)``; chosen by us."""
 
 
 @dataclass(frozen=True)
@@ -152,7 +152,7 @@ def _segments(name: str, n_segments: int, p: PeristalsisParameters, *, relays_jo
     return network
 
 
-def drive_conductance_uS(parameters: PeristalsisParameters | None = None, share: float = DRIVE_SHARE) -> float:
+def drive_conductance_uS(parameters: PeristalsisParameters | None = None) -> float:
     """Designs g_D, with which a descending neuron makes half-centres faster; our own derivation.
 
     Its activity a = clip(U / R, 0, 1), the drive, excites both neurons of a half-centre with ``D = a g_D``. So the gate
@@ -163,13 +163,12 @@ def drive_conductance_uS(parameters: PeristalsisParameters | None = None, share:
 
     Args:
         parameters: Of the half-centre; default: those of the papers.
-        share: Share of the inhibiting current that drive 1 takes over, ``g_D E_ex / (g_CPG |E_inh|)``.
 
     Returns:
         g_D, uS.
     """
     p = parameters or PeristalsisParameters()
-    return -share * p.conductances.half_centre * p.inhibitory_reversal_mV / p.excitatory_reversal_mV
+    return -DRIVE_SHARE * p.conductances.half_centre * p.inhibitory_reversal_mV / p.excitatory_reversal_mV
 
 
 def add_drive(

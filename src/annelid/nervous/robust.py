@@ -44,39 +44,32 @@ _MOTOR_CHARGE = 9.0
 MOTOR_SHARE = _MOTOR_CHARGE / (1.0 + _MOTOR_CHARGE)
 
 
+PUSH_NA = 6.0
+"""Current of a full relay into the next segment's contraction neuron at rest."""
+ENTRAINMENT = 0.02
+"""Share of the relay's drive that the sensor may add or take."""
+HABIT_MS = 10_000.0
+"""Time constant with which the sensor adapts."""
+
+
 @dataclass(frozen=True)
 class RobustParameters(HalfCentre):
     """What the network is designed from: its half-centres, which are bistable, and what was added to them.
 
     Attributes:
         turn_ms: Time from one segment's contraction to the next one's.
-        push_nA: Current of a full relay into the next segment's contraction neuron at rest.
-        entrainment: Share of the relay's drive that the sensor may add or take.
-        habit_ms: Time constant with which the sensor adapts.
 
     Raises:
-        ConfigError: As `HalfCentre`; a delta that is not negative, a time or push that is not positive, a negative
-            entrainment, or a push with which the hold would never yield to the relay, or not suppress.
+        ConfigError: As `HalfCentre`; a delta that is not negative, or a time that is not positive.
     """
 
     bifurcation_mV: float = -1.0
     turn_ms: float = 875.0
-    push_nA: float = 6.0
-    entrainment: float = 0.02
-    habit_ms: float = 10000.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
         require_negative(bifurcation_mV=self.bifurcation_mV)
-        require_positive(turn_ms=self.turn_ms, push_nA=self.push_nA, habit_ms=self.habit_ms)
-        require_at_least(0, entrainment=self.entrainment)
-        if not 0.0 < yielding_hold(self, self.push_nA) < 1.0:
-            least = -yielding_hold(self, 0.0) * self.hold_down_uS * -self.inhibitory_reversal_mV
-            most = least - self.hold_down_uS * self.inhibitory_reversal_mV
-            raise ConfigError(
-                f"push_nA = {self.push_nA:g} must be between {least:.4g} and {most:.4g} nA, so that a segment "
-                "contracts without its hold and not with it"
-            )
+        require_positive(turn_ms=self.turn_ms)
 
     @property
     def charge_uS(self) -> float:
@@ -109,7 +102,7 @@ def yield_opening(p: RobustParameters) -> float:
     """
     reach, leak = p.range_mV, p.leak_conductance_uS + p.charge_uS
     alone = yielding_hold(p, 0.0)
-    slope = yielding_hold(p, p.push_nA) - alone
+    slope = yielding_hold(p, PUSH_NA) - alone
     square = reach * slope * p.release_uS
     linear = p.release_uS * (reach * alone - p.inhibitory_reversal_mV) + reach * slope * leak
     constant = reach * alone * leak - p.charge_uS * p.excitatory_reversal_mV
@@ -136,7 +129,7 @@ def robust_network(n_segments: int, parameters: RobustParameters | None = None) 
     segments, leak, reach = range(1, n_segments + 1), p.leak_conductance_uS, p.range_mV
     tau_ms = p.turn_ms / log(reach / (reach - yield_mV(p)))
     # Both carry the same current into a relay at rest, e Gm R, so that a steady stretch cancels.
-    share_nA = p.entrainment * leak * reach
+    share_nA = ENTRAINMENT * leak * reach
     network = Network(f"robust peristalsis of {n_segments} segments")
     for segment in segments:
         contraction, expansion, hold, relay, stretch, habit = (f"{role}_{segment}" for role in ROLES)
@@ -146,20 +139,20 @@ def robust_network(n_segments: int, parameters: RobustParameters | None = None) 
         network.add_neuron(hold, p.leaky_neuron, 0.0 if first else reach)
         network.add_neuron(relay, Neuron(tau_ms * (leak + p.charge_uS), leak), 0.0)
         network.add_neuron(stretch, p.leaky_neuron, 0.0)
-        network.add_neuron(habit, Neuron(p.habit_ms * leak, leak), 0.0)
+        network.add_neuron(habit, Neuron(HABIT_MS * leak, leak), 0.0)
         add_hold(network, hold, down=contraction, up=expansion, half_centre=p)
         network.add_synapse(contraction, relay, p.excitatory(p.charge_uS))
         network.add_synapse(stretch, relay, p.excitatory(share_nA / p.excitatory_reversal_mV))
         network.add_synapse(habit, relay, p.inhibitory(-share_nA / p.inhibitory_reversal_mV))
     network.add_neuron(TONIC_NEURON, Neuron(p.capacitance_nF, leak, bias_nA=leak * reach), reach)
     # What a relay pushes with when the hold yields, so that the first segment takes its turn as all others do.
-    tonic_nA = p.push_nA * yield_opening(p)
+    tonic_nA = PUSH_NA * yield_opening(p)
     network.add_synapse(TONIC_NEURON, "contraction_1", p.excitatory(tonic_nA / p.excitatory_reversal_mV))
     # Below R / 2 nobody is suppressed: else many segments that all begin to contract could keep each other from it.
     suppression = Synapse(p.charge_uS, p.excitatory_reversal_mV, 0.5 * reach, reach)
     opening = THRESHOLD * reach, (THRESHOLD + _WINDOW) * reach
     release = Synapse(p.release_uS, p.inhibitory_reversal_mV, *opening)
-    push = Synapse(p.push_nA / p.excitatory_reversal_mV, p.excitatory_reversal_mV, *opening)
+    push = Synapse(PUSH_NA / p.excitatory_reversal_mV, p.excitatory_reversal_mV, *opening)
     discharge = Synapse(DISCHARGE * (leak + p.charge_uS), 0.0, 0.0, reach)
     for segment in segments:
         following = segment % n_segments + 1

@@ -186,7 +186,7 @@ class Model:
             predicted.append([one.predicted(config, data, what) for one, data, what in pairs])
         return predicted
 
-    def derivatives(self, logs: Array, stage: str = "identifying") -> list[Array]:
+    def derivatives(self, logs: Array) -> list[Array]:
         """Returns the change of every prediction for a relative change of each parameter, ``(n, p)``."""
         for at, known in self._slopes:
             # Differences over a step change less than that from so near a place.
@@ -195,7 +195,7 @@ class Model:
         high = bounds(self.study)[1]
         steps = [STEP if logs[i] + STEP <= high[i] else -STEP for i in range(len(logs))]
         moved = [logs + step * axis for step, axis in zip(steps, np.eye(len(logs)), strict=True)]
-        here, *there = self.predicted([logs, *moved], stage)
+        here, *there = self.predicted([logs, *moved])
         slopes = [
             np.stack([(one[part] - here[part]) / step for one, step in zip(there, steps, strict=True)], axis=-1)
             for part in range(len(self.data))

@@ -35,13 +35,11 @@ class Noise:
     discrepancy: float = 0.0
     length: float = 1.0
 
-    def covariance(self, data: Data, other: Data | None = None) -> Array:
-        """Covariance of points, ``(n, n)``, or with those of another part of the same data, ``(n, m)``."""
-        far = data if other is None else other
-        distance = np.abs(data.at[:, None] - far.at)
-        alike = data.series[:, None] == far.series
-        slow = self.discrepancy**2 * np.exp(-distance / self.length) * alike
-        return slow + (self.noise**2 * np.eye(len(data.at)) if other is None else 0.0)
+    def covariance(self, data: Data) -> Array:
+        """Covariance of points, ``(n, n)``."""
+        distance = np.abs(data.at[:, None] - data.at)
+        alike = data.series[:, None] == data.series
+        return self.discrepancy**2 * np.exp(-distance / self.length) * alike + self.noise**2 * np.eye(len(data.at))
 
     def root(self, data: Data) -> Array:
         """Lower root of the covariance: what it divides is independent with a standard deviation of 1."""

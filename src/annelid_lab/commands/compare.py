@@ -2,28 +2,33 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NoReturn
 
 import typer
 
 from annelid.cli import Force, command, complain, give, lock, play, print_paths, refuse_existing, runs_from
-from annelid.errors import RunFileError
+from annelid.errors import ConfigError, RunFileError
 
 
 @command("compare", "Robot")
 def compare_command(
     runs: Annotated[
-        list[Path],
+        list[Path] | None,
         typer.Argument(
             metavar="RUN RUN..",
             autocompletion=runs_from,
+            show_default=False,
             help="Folders of runs, or their run.nc; differences are to the first. With --map: a run and a table.",
         ),
-    ],
+    ] = None,
     log_map: Annotated[
         Path | None,
         typer.Option("--map", metavar="MAP.toml", help="Compare with measured data: what the table's columns are."),
+    ] = None,
+    map_for: Annotated[
+        Path | None, typer.Option("--map-for", metavar="LOG", help="Print a map for a log, to complete and edit.")
     ] = None,
     from_time: Annotated[
         float, typer.Option(help="With --map: time of the run before which nothing is compared, s.")
@@ -48,6 +53,7 @@ def compare_command(
     annelid compare runs/riddle2023-rods-001 runs/riddle2023-rods-002
     annelid compare runs/riddle2023-rods-001 runs/riddle2022-planar-001 -o comparison
     annelid compare runs/* --json | jq .numbers.period_s
+    annelid compare --map-for robot.csv > robot.toml
     annelid compare runs/wang-001 robot.csv --map robot.toml -o robot
     annelid compare runs/wang-001 robot.csv --map robot.toml --view
 
@@ -55,6 +61,15 @@ def compare_command(
     Both are aligned in time, and every signal's error, amplitude, phase and duty are printed; -o adds
     agreement.json and agreement.png. docs/how_to/measured_data.md describes map and numbers.
     """
+    runs = runs or []
+    if map_for is not None:
+        from annelid_lab.logs import proposed_map
+
+        proposal, missing = proposed_map(map_for)
+        typer.echo(proposal, nl=False)
+        for one in missing:
+            complain(f"state {one}")
+        return
     if log_map is not None:
         _compare_measured(runs, log_map, from_time, output, force=force, view=view)
         return
@@ -66,6 +81,8 @@ def compare_command(
     from annelid.simulation import open_run
     from annelid.terminal import Console
 
+    if len(runs) == 2 and runs[1].is_file() and runs[1].suffix != ".nc":
+        _propose_map(*runs)
     if len(runs) < 2:
         raise typer.BadParameter("name at least two runs to compare")
     if potentials and output is None:
@@ -91,6 +108,20 @@ def compare_command(
         except RunFileError as error:
             complain(f"{name} not drawn: {error}")
     print_paths(written)
+
+
+def _propose_map(run: Path, log: Path) -> NoReturn:
+    """Writes a map for a log that came without one, and says how to go on."""
+    from annelid_lab.logs import proposed_map
+
+    own = Path(f"{log.name.partition('.')[0]}.map.toml")
+    go_on = f"annelid compare {shlex.quote(str(run))} {shlex.quote(str(log))} --map {shlex.quote(str(own))}"
+    if own.exists():
+        raise ConfigError(f"a log needs a map, and there is {own}: {go_on}")
+    proposal, missing = proposed_map(log)
+    own.write_text(proposal, encoding="utf-8")
+    to_do = f"state in it {'; '.join(missing)}" if missing else "check it"
+    raise ConfigError(f"a log needs a map of its columns. {own} is a proposal: {to_do}. Then: {go_on}")
 
 
 def _compare_measured(

@@ -69,7 +69,7 @@ def read_measured(path: str | Path, log_map: LogMap) -> Measured:
 
     def score(names: Sequence[str]) -> int:
         # A name above the coordinates of a point, as in motion capture, is not yet the point.
-        return sum(2 * bool(_points(name, names)) or names.count(name) == 1 for name in needed if name is not None)
+        return sum(2 * bool(points_of(name, names)) or names.count(name) == 1 for name in needed if name is not None)
 
     table = read_table(Path(path), score, log_map.individual)
     time_s, rows = _instants(table, log_map)
@@ -104,7 +104,7 @@ def outliers(series: Array) -> np.ndarray:
     return far & (np.bincount(after, minlength=len(far) + 1)[after] <= 3)
 
 
-def _points(name: str, names: Sequence[str]) -> dict[str, dict[str, str]]:
+def points_of(name: str, names: Sequence[str]) -> dict[str, dict[str, str]]:
     """Finds a tracked point among columns: the column of each coordinate and of the certainty, by individual."""
     words = "|".join(("x", "y", "z", *_CERTAINTY))
     form = re.compile(rf"(?:(.+)[.:])?{re.escape(name)}[._: ]({words})(?:[_ (\[]+[A-Za-zµμ]+[)\]]?)?", re.IGNORECASE)
@@ -145,7 +145,7 @@ def _series(name: str, column: Column, table: LogTable, log_map: LogMap) -> tupl
 
 def _place(name: str, table: LogTable, log_map: LogMap) -> tuple[Array, str | None]:
     """A tracked point's place, ``(n, 2)`` or ``(n, 3)``, NaN where it is unlikely, and its unit if that is stated."""
-    points = _points(name, table.names)
+    points = points_of(name, table.names)
     if log_map.individual is not None:
         points = {who: axes for who, axes in points.items() if who in ("", log_map.individual)}
     if not points:
@@ -168,7 +168,7 @@ def _instants(table: LogTable, log_map: LogMap) -> tuple[Array, np.ndarray]:
         offered = suggest(log_map.time, table.names)
         raise ConfigError(f"{table.path} has no column {shown(log_map.time)}: {offered}")
     text = table.cells[log_map.time]
-    time_s = None if text.dtype.kind in "fiu" else _clock_times(pandas.Series(text.astype(str)), table)
+    time_s = None if text.dtype.kind in "fiu" else clock_times(pandas.Series(text.astype(str)), table)
     if time_s is None:
         kind, factor = unit_of(log_map.time, log_map.time_unit or table.units.get(log_map.time), "time_unit")
         if kind != "s":
@@ -189,7 +189,7 @@ def _instants(table: LogTable, log_map: LogMap) -> tuple[Array, np.ndarray]:
     return time_s[dated], dated
 
 
-def _clock_times(cells: pandas.Series, table: LogTable) -> Array | None:
+def clock_times(cells: pandas.Series, table: LogTable) -> Array | None:
     """Dates and clocks as seconds since the first, NaN where there is none; None where most cells are neither."""
     text = cells.str.strip().str.replace(",", ".", regex=False)
     if text.str.fullmatch(_CLOCK).mean() > 0.5:

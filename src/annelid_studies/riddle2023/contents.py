@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from math import isfinite
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -62,18 +61,12 @@ class Findings:
     """What an examination found; ``examinations/examinations.toml`` explains the words."""
 
     answer: str
-    caption: str
     table: Table
     remarks: Sequence[str] = ()
-    # Single results that claims are judged by; NaN and infinities become None, since JSON lacks them
-    numbers: Mapping[str, Number] = field(default_factory=dict)
+    numbers: Mapping[str, Number] = field(default_factory=dict)  # Single results that claims are judged by
 
     def __post_init__(self) -> None:
-        plain = {
-            name: value if value is None or isinstance(value, str) else float(value) if isfinite(value) else None
-            for name, value in self.numbers.items()
-        }
-        object.__setattr__(self, "numbers", Numbers(plain))
+        object.__setattr__(self, "numbers", Numbers(self.numbers))
 
 
 @dataclass(frozen=True)
@@ -84,15 +77,14 @@ class Examination:
     title: str
     question: str
     cases: Callable[[Effort], Sequence[Case]]  # The runs that it needs at an effort
-    # Draws its figure as ``<stem>.svg`` and ``<stem>.png`` and returns what it found in a store of its runs
-    examine: Callable[[Store, Effort, Path], Findings]
+    examine: Callable[[Store, Effort], Findings]  # Returns what it found in a store of its runs
 
 
 EXAMINATIONS_TOML = "examinations/examinations.toml"
 
 
 def examination(
-    name: str, cases: Callable[[Effort], Sequence[Case]], examine: Callable[[Store, Effort, Path], Findings]
+    name: str, cases: Callable[[Effort], Sequence[Case]], examine: Callable[[Store, Effort], Findings]
 ) -> Examination:
     """Makes an examination whose words stand in ``examinations.toml``."""
     words = texts(EXAMINATIONS_TOML)[name]
@@ -116,17 +108,16 @@ def findings(
         numbers: Single results that claims are judged by.
     """
     words = texts(EXAMINATIONS_TOML)[name]
-    answer, caption = (filled(words[part], values) for part in ("answer", "caption"))
-    return Findings(answer, caption, table, [filled(words["remarks"][one], values) for one in remarks], numbers or {})
+    said = [filled(words["remarks"][one], values) for one in remarks]
+    return Findings(filled(words["answer"], values), table, said, numbers or {})
 
 
 @dataclass(frozen=True)
 class Examined:
-    """An examination with what it found and its figure."""
+    """An examination with what it found."""
 
     examination: Examination
     findings: Findings
-    picture: Path
 
 
 @dataclass(frozen=True)

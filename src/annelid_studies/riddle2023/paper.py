@@ -2,33 +2,27 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import platform
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
 
 from annelid.analysis import PAPER_ELONGATION_M, PAPER_END_DIFFERENCE, PAPER_MIDDLE_DEFICIT, middle_deficit
 from annelid.body import worm_of
 from annelid.draw import figure7, network_figure
 from annelid.errors import ConfigError, suggest
-from annelid.experiment import Case, Outcome, Store, StudyProgress, code_fingerprint
+from annelid.experiment import Case, Outcome, Store, StudyProgress
 from annelid.markdown import Table
 from annelid.nervous import PeristalsisParameters, peristalsis_network
-from annelid.output import write_text
 from annelid.simulation import Run, locks
-from annelid.textfiles import read_json
 from annelid_studies.riddle2023 import words
 from annelid_studies.riddle2023.claims import Evidence, claim_cases, paper_claims, rule
 from annelid_studies.riddle2023.claims.evidence import order_of, readings_m
-from annelid_studies.riddle2023.contents import EXAMINATIONS_TOML, Claim, Examined, Figure, Findings, Report
+from annelid_studies.riddle2023.contents import Claim, Examined, Figure, Report
 from annelid_studies.riddle2023.examinations import EXAMINATIONS
 from annelid_studies.riddle2023.examinations.design import walked_elongation
-from annelid_studies.riddle2023.figures import muscle_surface, planar_models, propagation, renderings, robot_lengths
+from annelid_studies.riddle2023.figures import muscle_surface, propagation, renderings, robot_lengths
 from annelid_studies.riddle2023.words import CM, MM, PERCENT, caption, texts
 from annelid_studies.worms import CHAIN, FAST, RODS, RODS_STEP_S, Effort, rods
 
@@ -67,7 +61,7 @@ def reproduce(
         progress: Called as the work goes on.
 
     Returns:
-        The report, whose pictures are drawn.
+        The report, whose pictures are drawn: without those that are rendered where there is no OpenGL.
 
     Raises:
         ConfigError: An examination has no such name.
@@ -83,39 +77,22 @@ def reproduce(
         cases += claim_cases(effort)
     store = Store(folder / "runs", executor, progress=progress)
     outcomes = store.compute(cases, "running worms")
-    pictures = folder / "figures"
-    pictures.mkdir(parents=True, exist_ok=True)
-    n_pictures = len(chosen) + (0 if only else len(FIGURES))
-    examined: list[Examined] = []
+    examined = [Examined(asked, asked.examine(store, effort)) for asked in chosen]
     figures: list[Figure] = []
-
-    def report_drawing() -> None:
-        done = len(examined) + len(figures)
-        if progress is not None:
-            progress("drawing", done, n_pictures, done / n_pictures)
-
-    for asked in chosen:
-        report_drawing()
-        stem = pictures / asked.name
-        runs = sorted({store.path(case).name for case in asked.cases(effort)})
-        made_of = [effort, runs, texts(EXAMINATIONS_TOML).get(asked.name)]
-        found = kept(stem, made_of, lambda asked=asked, stem=stem: asdict(asked.examine(store, effort, stem)))
-        findings = Findings(**{**found, "table": Table(**found["table"])})
-        examined.append(Examined(asked, findings, stem.with_suffix(".png")))
     main, claims, judging = store.run(MAIN), list[Claim](), list[str]()
     if only is None:
         series = {f"{CHAIN}, first helix": walked_elongation(store[MAIN], first_helix=True).tolist()}
         series |= {f"{label}, mean of six": walked_elongation(store[variants[label]]).tolist() for label in _QUICK}
-        for number, draw in FIGURES.items():
-            report_drawing()
-            stem = pictures / f"figure_{number}"
-            text = texts("figures/figures.toml")[str(number)]
-            made_of = [store.path(MAIN).name, series, text]
-            found = kept(stem, made_of, lambda draw=draw, stem=stem: {"caption": draw(main, series, stem)})
-            figures.append(Figure(number, text["title"], stem.with_suffix(".png"), found["caption"]))
+        pictures = folder / "figures"
+        pictures.mkdir(parents=True, exist_ok=True)
+        drawn = [number for number in FIGURES if number not in RENDERED or renderings.rendering_works()]
+        for i, number in enumerate(drawn):
+            if progress is not None:
+                progress("drawing", i, len(drawn), i / len(drawn))
+            stem, title = pictures / f"figure_{number}", texts("figures/figures.toml")[str(number)]["title"]
+            figures.append(Figure(number, title, stem.with_suffix(".png"), FIGURES[number](main, series, stem)))
         evidence = Evidence(store, effort, {one.examination.name: one.findings for one in examined})
         claims, judging = paper_claims(evidence), rule(evidence)
-    report_drawing()
     return Report(
         effort=effort,
         summary=_summary(main),
@@ -134,30 +111,6 @@ def reproduce(
         },
         rule=judging,
     )
-
-
-def kept(stem: Path, made_of: Sequence[object], make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-    """Returns what goes with a picture: as it was kept, or made anew where code, runs or picture have changed.
-
-    Args:
-        stem: Path of the picture, an SVG and a PNG, and of the JSON that keeps what goes with it, without suffix.
-        made_of: All that the picture depends on beside annelid's code, of plain numbers, words and lists.
-        make: Draws the picture and returns what goes with it, ready for JSON.
-    """
-    mark = hashlib.sha256(
-        json.dumps([code_fingerprint("annelid", "annelid_lab", "annelid_studies"), *made_of]).encode()
-    ).hexdigest()
-    note, *pictures = (stem.with_name(f"{stem.name}{suffix}") for suffix in (".json", ".svg", ".png"))
-    try:
-        content = read_json(note)
-        if content["mark"] == mark and all(picture.exists() for picture in pictures):
-            return content["found"]
-    except (OSError, ValueError, KeyError, TypeError):
-        pass
-    note.unlink(missing_ok=True)
-    found = make()
-    write_text(note, json.dumps({"mark": mark, "found": found}))
-    return found
 
 
 Series = Mapping[str, Sequence[float]]
@@ -183,8 +136,6 @@ def _figure_7(run: Run, series: Series, stem: Path) -> str:
 
 
 FIGURES: Mapping[int, Callable[[Run, Series, Path], str]] = {
-    1: lambda run, series, stem: planar_models.figure_1_planar_models(stem),
-    2: lambda run, series, stem: propagation.figure_2_propagation(run, stem),
     4: lambda run, series, stem: renderings.figure_4_model(run.config, stem),
     5: _figure_5,
     6: _figure_6,
@@ -193,6 +144,8 @@ FIGURES: Mapping[int, Callable[[Run, Series, Path], str]] = {
     9: lambda run, series, stem: robot_lengths.figure_9_robot_lengths(series, stem),
 }
 """What draws each figure and returns its caption."""
+RENDERED = (4, 8)
+"""Figures that need OpenGL."""
 
 
 def _variants_table(variants: Mapping[str, Outcome]) -> Table:

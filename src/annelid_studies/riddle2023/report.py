@@ -48,7 +48,7 @@ def write_report(report: Report, folder: Path) -> Path:
         *_details_of_numbers(report),
         *_claims(report),
         *_more_figures(others, folder),
-        *_examinations(report.examinations, folder),
+        *_examinations(report.examinations),
         *_how_to_reproduce(report),
     ]
     contents, content = _contents(blocks), "\n\n".join(blocks)
@@ -132,12 +132,11 @@ def _figure(figure: Figure, folder: Path) -> list[str]:
     return [_picture(figure.picture, figure.title, folder), caption]
 
 
-def _examinations(examinations: Sequence[Examined], folder: Path) -> list[str]:
+def _examinations(examinations: Sequence[Examined]) -> list[str]:
     blocks = ["## Examinations"] if examinations else []
     for examined in examinations:
         asked, found = examined.examination, examined.findings
-        picture = _picture(examined.picture, asked.title, folder)
-        answer = [strong(found.answer), picture, emphasis(found.caption), plain_table(found.table)]
+        answer = [strong(found.answer), plain_table(found.table)]
         blocks += [f"### {words(capitalised(asked.title))}", words(asked.question), *answer]
         blocks += _paragraphs(found.remarks)
     return [block for block in blocks if block]

@@ -5,11 +5,9 @@ from annelid_studies.riddle2023.examinations.friction import FRICTION
 from annelid_studies.riddle2023.examinations.gate import GATE
 from annelid_studies.riddle2023.examinations.noise import NOISE
 from annelid_studies.riddle2023.examinations.pins import PINS
-from annelid_studies.riddle2023.examinations.radius import RADIUS
 from annelid_studies.riddle2023.examinations.ranges import RANGES
-from annelid_studies.riddle2023.examinations.springs import SPRINGS
 from annelid_studies.riddle2023.examinations.timestep import TIMESTEP
 
-EXAMINATIONS = (PINS, RANGES, SPRINGS, RADIUS, NOISE, FRICTION, TIMESTEP, DISCRETIZATION, GATE)
+EXAMINATIONS = (PINS, RANGES, NOISE, FRICTION, TIMESTEP, DISCRETIZATION, GATE)
 
 __all__ = ["EXAMINATIONS"]

@@ -1,22 +1,17 @@
-"""Several worms side by side: what varies, what is read from each run, and one look for all of their figures."""
+"""Several worms side by side: what varies, and what is read from each run."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from math import nan
 from typing import Any, NamedTuple
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from annelid.analysis import RhythmScore, middle_deficit
-from annelid.draw import panel_title, segment_colors
 from annelid.experiment import Case, Hold, Outcome, Store
 from annelid.morphology import Array
-from annelid_studies.riddle2023 import words
 from annelid_studies.riddle2023.contents import Number
 from annelid_studies.riddle2023.words import number
 from annelid_studies.tables import grouped
@@ -29,16 +24,7 @@ class Worm:
 
     name: str  # One word, for names of numbers
     label: str  # For legends and tables
-    short: str  # For narrow places
     case: Callable[[Mapping[str, Any] | None], Case]  # Makes its case from changed fields
-    marker: str  # Its marker in figures
-    line: str  # Its line style
-    color: str  # Its colour where colours do not tell segments
-
-    @property
-    def look(self) -> dict[str, Any]:
-        """Marker, line and colour as matplotlib takes them."""
-        return {"marker": self.marker, "linestyle": self.line, "color": self.color, "label": self.label}
 
     @property
     def tolerance_m(self) -> float:
@@ -46,9 +32,9 @@ class Worm:
         return self.case(None).config.sensor.tolerance_m
 
 
-PAPERS = Worm("chain", "the paper's chain", "chain", chain, "o", "-", "#1b2a6b")
-SOFT = Worm("fast", "rods with soft crossings", "soft", fast, "s", "--", "#6b7280")
-RIGID = Worm("rods", "rods with rigid crossings", "rigid", rods, "^", ":", "#e07b39")
+PAPERS = Worm("chain", "the paper's chain", chain)
+SOFT = Worm("fast", "rods with soft crossings", fast)
+RIGID = Worm("rods", "rods with rigid crossings", rods)
 WORMS = (PAPERS, SOFT, RIGID)
 
 
@@ -181,89 +167,3 @@ def numbered(readings: Iterable[Reading], readers: Mapping[str, Callable[[Readin
         for one in readings
         for name, reader in readers.items()
     }
-
-
-def draw_over(
-    axes: Axes, readings: Iterable[Reading], numbers: Callable[[Reading], Any], *, hollow: bool = False, **style: Any
-) -> None:
-    """Draws numbers of readings over what is varied, a line a worm; one number a segment makes a line a segment.
-
-    Markers may be hollow, and lines have further properties as matplotlib takes them.
-    """
-    for worm, own in by_worm(readings).items():
-        x, y = [one.value for one in own], np.array([numbers(one) for one in own], dtype=float)
-        columns = [(y, worm.color)] if y.ndim == 1 else list(zip(y.T, segment_colors(y.shape[1]), strict=True))
-        for column, color in columns:
-            look = {**worm.look, "color": color, "markersize": 5.0, "markerfacecolor": "white" if hollow else color}
-            axes.plot(x, column, **{**look, **style})
-
-
-_DARK, _LIGHT = "#1b2a6b", "white"
-_RHYTHMS: dict[str, dict[str, Any]] = {
-    "1-2-3": {"marker": "o", "markerfacecolor": _DARK},
-    "other order": {"marker": "D", "markerfacecolor": "#9aa3c7"},
-    "disordered": {"marker": "s", "markerfacecolor": _LIGHT},
-    "silent": {"marker": "x", "markerfacecolor": _DARK},
-    "too short": {"marker": "_", "markerfacecolor": _DARK},
-}
-
-
-def draw_rhythms(axes: Axes, readings: Iterable[Reading]) -> list[Line2D]:
-    """Draws the kind of rhythm of closed loops, a row a worm; returns handles for a legend of the kinds that occur."""
-
-    def look(kind: str) -> dict[str, Any]:
-        return {"linestyle": "none", "color": _DARK, "markersize": 6.5, **_RHYTHMS[kind]}
-
-    rows = by_worm(one for one in readings if one.walk is not None)
-    seen = set()
-    for i, row in enumerate(rows.values()):
-        for one in row:
-            seen.add(kind := words.kind(one.closed.rhythm))
-            axes.plot([one.value], [-i], **look(kind))
-    axes.set_yticks([-i for i in range(len(rows))], [worm.short for worm in rows])
-    axes.set_ylim(0.6 - len(rows), 0.6)
-    axes.grid(visible=False, axis="x")
-    return [Line2D([], [], label=kind, **look(kind)) for kind in _RHYTHMS if kind in seen]
-
-
-def cross_out(axes: Axes, readings: Iterable[Reading], numbers: Callable[[Reading], Any], size: float = 9.0) -> None:
-    """Draws black crosses over the numbers of runs that do not walk 1-2-3."""
-    for one in readings:
-        if not one.walks:
-            y = np.ravel(numbers(one))
-            axes.plot([one.value] * len(y), y, linestyle="none", marker="x", color="black", markersize=size)
-
-
-def label_panel(
-    axes: Axes, title: str, x_label: str, y_label: str, ticks: Iterable[float] = (), *, logarithmic: bool = False
-) -> None:
-    """Names a panel and its axes, and labels the abscissa with values of what is varied."""
-    panel_title(axes, title)
-    axes.set(xlabel=x_label, ylabel=y_label)
-    if logarithmic:
-        axes.set_xscale("log")
-    if places := list(ticks):
-        axes.set_xticks(places, [f"{place:g}" for place in places])
-        axes.minorticks_off()
-
-
-def segment_handles(n_segments: int = 3) -> list[Line2D]:
-    """Returns handles for a legend of the segments' colours."""
-    colors = enumerate(segment_colors(n_segments), start=1)
-    return [look_handle(f"segment {i}", color=color, linewidth=3.0) for i, color in colors]
-
-
-def look_handle(label: str, *, hollow: bool = False, color: Any = "0.25", **look: Any) -> Line2D:
-    """Returns a handle for a legend of markers and line styles."""
-    face = "white" if hollow else color
-    return Line2D([], [], label=label, color=color, **{"markersize": 5.0, "markerfacecolor": face, **look})
-
-
-def worm_handles() -> list[Line2D]:
-    """Returns handles for a legend of the worms' looks."""
-    return [look_handle(**worm.look) for worm in WORMS]
-
-
-def legend_below(figure: Figure, handles: Sequence[Line2D], columns: int | None = None) -> None:
-    """Puts a legend under all panels, where it covers nothing."""
-    figure.legend(handles=handles, loc="outside lower center", ncols=columns or len(handles), columnspacing=1.4)

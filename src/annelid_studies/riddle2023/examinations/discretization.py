@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from annelid.draw import canvas, save_both
 from annelid.experiment import Store
 from annelid.morphology import Array
 from annelid_studies.riddle2023 import words
 from annelid_studies.riddle2023.contents import Findings, Number, examination, findings
 from annelid_studies.riddle2023.examinations import design
 from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, Columns, Point, Reading, Worm
-from annelid_studies.riddle2023.words import CM, PERCENT
 from annelid_studies.tables import tabulated
 from annelid_studies.worms import Effort, one_after_the_other
 
@@ -63,11 +60,6 @@ QUANTITIES: Mapping[str, Callable[[Reading], Array]] = {
     "force": lambda one: one.at_holds("force_N"),
 }
 """What is read of each segment at the end of its own contraction."""
-_LOOKS: Mapping[str, dict[str, Any]] = {
-    "elongation": {"marker": "o", "color": "#1b2a6b"},
-    "ring length": {"marker": "s", "color": "#c2410c"},
-    "force": {"marker": "^", "color": "#35b5a0"},
-}
 
 
 class Convergence(NamedTuple):
@@ -98,19 +90,17 @@ def _apart(quantity: str, one: Reading, other: Reading) -> float:
     return float(np.sqrt(np.mean((values / reference - 1.0) ** 2)))
 
 
-def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
+def _examine(store: Store, effort: Effort) -> Findings:
     readings = design.read(_points(effort), store)
     by_worm = design.by_worm(readings)
     held = [measure_convergence(own) for own in by_worm.values()]
     walks = [one for one in readings if one.walk]
-    _draw(held, walks, stem)
     first = held[0]
     numbers: dict[str, Number] = {}
     for found in held:
         for name, apart in found.of_presets.items():
             kind = f"{name.replace(' ', '_')}_{found.worm.name}"
             numbers |= {f"difference_{kind}": apart, f"order_{kind}": found.order[name]}
-    lines = {"-": "solid", "--": "dashed", ":": "dotted"}
     columns: Columns = {
         "worm": lambda one: one.worm.label,
         "elements a side": lambda one: f"{one.value:g}",
@@ -123,10 +113,6 @@ def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
     said: dict[str, Any] = {
         "held": " ".join(map(_convergence_in_words, held)),
         "walk": _walks_in_words(walks),
-        "finest": words.listed(f"{found.worm.label} against {found.elements[-1]}" for found in held),
-        "lines": words.listed(f"{found.worm.label} {lines[found.worm.line]}" for found in held),
-        "rigid": RIGID.label,
-        "n_walks": len(walks),
         "worm": first.worm.label,
         "coarse": by_worm[first.worm][0].at_holds("ring_length_m"),
         "fewest": first.elements[0],
@@ -161,30 +147,6 @@ def _walks_in_words(walks: Sequence[Reading]) -> str:
         f"side, elongations within {words.in_percent(spread)} % and periods of {words.span(periods, digits=3)} s, "
         f"and fail with {words.listed(bad)}."
     )
-
-
-def _draw(held: Sequence[Convergence], walks: Sequence[Reading], stem: Path) -> None:
-    with canvas(3.5) as figure:
-        left, right = figure.subplots(1, 2)
-        for found in held:
-            for name, difference in found.difference.items():
-                hollow = {"markerfacecolor": "white"} if found.worm is PAPERS else {}
-                look = {**_LOOKS[name], "linestyle": found.worm.line, "markersize": 5.0, **hollow}
-                left.plot(found.elements[:-1], PERCENT * difference, **look)
-        design.draw_over(right, walks, lambda one: CM * one.walked_m)
-        design.cross_out(right, walks, lambda one: CM * one.walked_m, 8.0)
-        coarser, walked = {n for one in held for n in one.elements[:-1]}, {one.value for one in walks}
-        for axes, title, label, counts in (
-            (left, "Held contractions", "difference from the finest (%)", coarser),
-            (right, f"Walking, {RIGID.label}", "largest elongation (cm)", walked),
-        ):
-            design.label_panel(axes, title, "elements per rhombus side", label, sorted(counts), logarithmic=True)
-        left.set_yscale("log")
-        left.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
-        handles = [design.look_handle(name, linestyle="none", **look) for name, look in _LOOKS.items()]
-        crossed = design.look_handle("does not walk 1-2-3", linestyle="none", marker="x", color="black")
-        design.legend_below(figure, [*handles, crossed, *design.segment_handles()], columns=4)
-        save_both(figure, stem)
 
 
 DISCRETIZATION = examination("discretization", lambda effort: design.cases_of(_points(effort)), _examine)

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from annelid.draw import canvas, save_both
 from annelid.experiment import Case, Store
 from annelid_studies.riddle2023 import words
 from annelid_studies.riddle2023.contents import Findings, examination, findings
 from annelid_studies.riddle2023.examinations import design
-from annelid_studies.riddle2023.examinations.design import PAPERS, WORMS, Columns, Point, Reading, Worm
-from annelid_studies.riddle2023.words import CM, MM, PERCENT
+from annelid_studies.riddle2023.examinations.design import PAPERS, WORMS, Columns, Point, Worm
+from annelid_studies.riddle2023.words import MM
 from annelid_studies.tables import tabulated
 from annelid_studies.worms import Effort, one_after_the_other, rods
 
@@ -57,11 +55,10 @@ def _solved(effort: Effort) -> dict[tuple[float, float], Case]:
     }
 
 
-def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
+def _examine(store: Store, effort: Effort) -> Findings:
     readings = design.read(_points(effort), store)
     held = [one for one in readings if one.hold]
     solved = {at: words.number(store[case].summary.travel_m) for at, case in _solved(effort).items()}
-    _draw(readings, held, stem)
     at_papers = [one for one in readings if one.value == PAPERS_FRICTION]
     numbers = design.numbered(
         readings,
@@ -90,7 +87,6 @@ def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
         "small": words.labels(one for one in at_papers if abs(one.travel_m) < NEGLIGIBLE_M),
         "deficits": deficits,
         "parts": parts,
-        "counts": ", ".join(str(len(own)) for own in design.by_worm(readings).values()),
         "papers": PAPERS.label,
     }
     if solved:
@@ -116,30 +112,6 @@ def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
     }
     said = findings("friction", found, tabulated(readings, columns), ["full" if solved else "quick"], numbers)
     return replace(said, remarks=[*orders, *said.remarks])
-
-
-def _draw(readings: Sequence[Reading], held: Sequence[Reading], stem: Path) -> None:
-    with canvas(5.4) as figure:
-        (travel, elongation), (deficit, rhythms) = figure.subplots(2, 2)
-        design.draw_over(travel, readings, lambda one: CM * one.travel_m)
-        travel.axhline(0.0, color="0.3", linewidth=0.8)
-        for segment in (0, 1):
-            design.draw_over(elongation, readings, lambda one, i=segment: CM * one.walked_m[i], hollow=segment == 1)
-        design.draw_over(deficit, readings, lambda one: PERCENT * one.deficit)
-        design.draw_over(deficit, held, lambda one: PERCENT * one.held_deficit, hollow=True, linewidth=0.9)
-        elongation.set_ylim(bottom=0.0)
-        kinds = design.draw_rhythms(rhythms, readings)
-        for axes, title, label in (
-            (travel, "Travel", "forwards in 5 s (cm)"),
-            (elongation, "Elongation of segments 1 and 2", "elongation (cm)"),
-            (deficit, "Deficit", "segment 2 below segment 1 (%)"),
-            (rhythms, "Rhythm", ""),
-        ):
-            design.label_panel(axes, title, "coefficient of friction (1)", label, FRICTIONS, logarithmic=True)
-            axes.set_xlim(0.042, 1.8)
-        opened = design.look_handle("segment 2 / open loop", hollow=True, marker="o", linestyle="none")
-        design.legend_below(figure, [*design.worm_handles(), opened, *kinds], 4)
-        save_both(figure, stem)
 
 
 def _cases(effort: Effort) -> list[Case]:

@@ -4,26 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from math import nan
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from matplotlib.axes import Axes
 
 from annelid.analysis import DESIGN_INTERVAL_S, SHORTEST_S, RhythmScore, contractions, segment_activation
-from annelid.draw import canvas, panel_title, save_both, segment_colors
 from annelid.experiment import Case, Outcome, Store
 from annelid.morphology import Array
 from annelid.simulation import open_run
 from annelid_studies.riddle2023 import words
 from annelid_studies.riddle2023.contents import Findings, examination, findings
-from annelid_studies.riddle2023.examinations import design
 from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, SOFT, Worm
 from annelid_studies.riddle2023.words import MS
 from annelid_studies.tables import grouped, tabulated
 from annelid_studies.worms import PLANAR, Effort
 
-FLAT = Worm("planar", "planar worm, kinematic", "planar", lambda changes: Case(PLANAR, changes or {}), "D", "-", "0.5")
+FLAT = Worm("planar", "planar worm, kinematic", lambda changes: Case(PLANAR, changes or {}))
 STARTS = ("toolbox", "steady")
 SCHEMES = ("euler", "toolbox", "heun")
 ALL = tuple((start, scheme) for start in STARTS for scheme in SCHEMES)
@@ -42,7 +38,6 @@ VARIANTS: Mapping[Effort, Mapping[Worm, Sequence[tuple[str, str]]]] = {
         FLAT: ALL,
     },
 }
-_SHOWN_S = 5.0
 
 
 def variant(worm: Worm, start: str, scheme: str) -> Case:
@@ -77,10 +72,9 @@ def read_beat(worm: Worm, start: str, scheme: str, outcome: Outcome) -> Beat:
     return Beat(worm, start, scheme, outcome.rhythm, outcome.summary.onsets_s, found)
 
 
-def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
+def _examine(store: Store, effort: Effort) -> Findings:
     pairs = [(worm, pair) for worm, pairs in VARIANTS[effort].items() for pair in pairs]
     beats = [read_beat(worm, *pair, store[variant(worm, *pair)]) for worm, pair in pairs]
-    _draw(beats, stem)
     flat = words.listed(
         f"{words.in_unit(beat.rhythm.period_s, MS, 1)} ms ({beat.start} start, {beat.scheme})"
         for beat in beats
@@ -99,7 +93,6 @@ def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
     }
     found = {
         **_answer(beats),
-        "shown_s": _SHOWN_S,
         "flat": flat,
         "design_ms": 3000.0 * DESIGN_INTERVAL_S,
     }
@@ -130,42 +123,6 @@ def _answer(beats: Sequence[Beat]) -> dict[str, Any]:
         "groups": len(groups),
         "spread_ms": None if spread is None else MS * spread,
     }
-
-
-def _draw(beats: Sequence[Beat], stem: Path) -> None:
-    worms = list(dict.fromkeys(beat.worm for beat in beats))
-    with canvas(5.0) as figure:
-        panels = figure.subplots(2, 2, sharex=True, sharey=True)
-        for axes, worm in zip(panels.flat, worms, strict=False):
-            for beat in beats:
-                if beat.worm is worm:
-                    _draw_beat(axes, ALL.index((beat.start, beat.scheme)), beat)
-            panel_title(axes, words.capitalised(worm.label))
-            axes.set_xlim(0.0, _SHOWN_S)
-            axes.set_ylim(len(ALL) - 0.4, -0.6)
-            axes.set_yticks(range(len(ALL)), [f"{start}, {scheme}" for start, scheme in ALL])
-            axes.tick_params(axis="y", length=0)
-            axes.grid(visible=False, axis="y")
-        for axes in panels[:, 0]:
-            axes.set_ylabel("gate start, update order")
-        for axes in panels[-1]:
-            axes.set_xlabel("time (s)")
-        design.legend_below(figure, design.segment_handles())
-        save_both(figure, stem)
-
-
-def _draw_beat(axes: Axes, row: int, beat: Beat) -> None:
-    n = len(beat.contractions_s)
-    height = 0.8 / n
-    for i, (spans, color) in enumerate(zip(beat.contractions_s, segment_colors(n), strict=True)):
-        look = {"left": spans[:, 0], "height": 0.85 * height, "color": color, "linewidth": 0.0}
-        middle = np.full(len(spans), row - 0.4 + (i + 0.5) * height)
-        axes.barh(middle, np.minimum(spans[:, 1], _SHOWN_S) - spans[:, 0], **look)
-    score = beat.rhythm
-    walks = score.is_one_wave and score.period_s is not None
-    place = {"xycoords": ("axes fraction", "data"), "xytext": (3, 0), "textcoords": "offset points", "va": "center"}
-    text = f"{score.period_s:.3f} s" if walks else words.kind(score)
-    axes.annotate(text, (1.0, row), **place, fontsize=7.5, annotation_clip=False)
 
 
 def _cases(effort: Effort) -> list[Case]:

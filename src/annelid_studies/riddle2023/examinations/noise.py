@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import sqrt
 from operator import attrgetter
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.patches import Patch, Rectangle
 
 from annelid.analysis import RhythmScore
 from annelid.config import field_value
-from annelid.draw import canvas, panel_title, save_both
 from annelid.experiment import Case, Store
 from annelid_studies.riddle2023 import words
 from annelid_studies.riddle2023.contents import Findings, Number, examination, findings
@@ -101,23 +96,6 @@ def share(cells: Cells, wanted: Callable[[RhythmScore], bool] = ONE_WAVE) -> flo
     return float(np.mean([np.mean([wanted(score) for score in scores]) for scores in cells.values()]))
 
 
-def majority(scores: Sequence[RhythmScore]) -> str:
-    """Returns the most frequent kind of rhythm; of two as frequent, the less ordered."""
-    counts = Counter("limping" if one.is_one_wave and not is_even(one) else words.kind(one) for one in scores)
-    return max(counts, key=lambda kind: (counts[kind], list(_FILLS).index(kind)))
-
-
-# From order to silence and from light to dark, so that the map reads in greyscale.
-_FILLS: dict[str, dict[str, Any]] = {
-    "1-2-3": {"facecolor": "#d5efe8", "edgecolor": "white", "label": "an even wave 1-2-3"},
-    "limping": {"facecolor": "#f6e3a8", "edgecolor": "#c9a227", "hatch": "\\\\", "label": "a limping wave 1-2-3"},
-    "other order": {"facecolor": "#d3b45f", "edgecolor": "#6d5716", "hatch": "...", "label": "another ordered wave"},
-    "too short": {"facecolor": "#c9ccd1", "edgecolor": "white", "label": "too short to tell"},
-    "disordered": {"facecolor": "#d9825b", "edgecolor": "#7a2e0e", "hatch": "////", "label": "disordered"},
-    "silent": {"facecolor": "#1b2a6b", "edgecolor": "white", "label": "silent"},
-}
-
-
 class _Read(NamedTuple):
     """A map with its runs, those of them in cells that all maps share, and the tolerances that need no luck, m."""
 
@@ -137,7 +115,7 @@ class _Read(NamedTuple):
         return max(self.even_window) / min(self.even_window) if self.even_window else 0.0
 
 
-def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
+def _examine(store: Store, effort: Effort) -> Findings:
     mapped = {
         chart: {place: [store[case].rhythm for case in cell] for place, cell in chart.cells().items()}
         for chart in MAPS[effort]
@@ -154,7 +132,6 @@ def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
         for chart, cells in mapped.items()
     ]
     noisy_maps = [one for one in maps if max(one.chart.noises_m) > 0]
-    _draw(maps, stem)
     numbers: dict[str, Number] = {}
     for one in maps:
         numbers[f"noise_handled_{one.worm.name}"] = handled_noise(one.cells)
@@ -164,9 +141,6 @@ def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
         "windows": words.by_worm(maps, lambda one: _in_mm(one.window)),
         "even_windows": words.by_worm(maps, lambda one: _in_mm(one.even_window)),
         "fragility": _fragility_in_words(maps, bool(common)),
-        "even": EVEN,
-        "seeds": maps[0].chart.n_seeds,
-        "duration_s": PAPERS.case(None).config.duration_s,
         "breadths": words.by_worm((one for one in maps if one.even_window), lambda one: f"{one.breadth:.1f}"),
         "by_noise": "; ".join(map(_by_noise, noisy_maps)),
         **_of_sensor(max(noise for one in maps for noise in one.chart.noises_m)),
@@ -264,43 +238,6 @@ def _of_sensor(most_m: float) -> dict[str, Any]:
         "most_mm": MM * most_m,
         "mean_mm": MM * most_m / sqrt(n_springs),
     }
-
-
-def _draw(maps: Sequence[_Read], stem: Path) -> None:
-    tolerances = sorted({tolerance for one in maps for tolerance in one.chart.tolerances_m})
-    noises = sorted({noise for one in maps for noise in one.chart.noises_m})
-    with canvas(1.35 + 0.38 * len(noises)) as figure:
-        panels = figure.subplots(1, len(maps), sharey=True, squeeze=False)[0]
-        for axes, one in zip(panels, maps, strict=True):
-            for (tolerance, noise), scores in one.cells.items():
-                _draw_cell(axes, tolerances.index(tolerance), noises.index(noise), scores)
-            axes.set_xlim(-0.5, len(tolerances) - 0.5)
-            axes.set_ylim(-0.5, len(noises) - 0.5)
-            axes.set_xticks(range(len(tolerances)), [f"{MM * tolerance:g}" for tolerance in tolerances])
-            axes.set_yticks(range(len(noises)), [f"{MM * noise:g}" for noise in noises])
-            axes.tick_params(length=0)
-            axes.grid(visible=False)
-            panel_title(axes, words.capitalised(one.worm.label))
-        panels[0].set_ylabel("sensor noise (mm)")
-        panels[len(maps) // 2].set_xlabel("tolerance of the stretch sensors (mm)")
-        seen = {majority(scores) for one in maps for scores in one.cells.values()}
-        handles = [Patch(**look) for kind, look in _FILLS.items() if kind in seen]
-        figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
-        save_both(figure, stem)
-
-
-def _draw_cell(axes: Axes, x: int, y: int, scores: Sequence[RhythmScore]) -> None:
-    """Shades a cell by its rhythm and writes into it how many runs walk, and how regularly."""
-    kind = majority(scores)
-    fill = _FILLS[kind]
-    axes.add_patch(Rectangle((x - 0.5, y - 0.5), 1.0, 1.0, linewidth=0.8, **fill))
-    walks = [score for score in scores if score.is_one_wave]
-    text = f"{len(walks)}/{len(scores)}"
-    if regularities := [score.regularity for score in walks if score.regularity is not None]:
-        text += f"\n{np.mean(regularities):.2f}".replace("\n0.", "\n.")
-    plate = {"facecolor": fill["facecolor"], "edgecolor": "none", "pad": 0.2} if "hatch" in fill else None
-    look: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 6.5, "linespacing": 1.1, "bbox": plate}
-    axes.text(x, y, text, color="white" if kind == "silent" else "black", **look)
 
 
 NOISE = examination("noise", _cases, _examine)

@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from annelid.body import build_spec, worm_of
 from annelid.config import field_value
-from annelid.draw import canvas, save_both
 from annelid.experiment import Case, Store
 from annelid_studies.riddle2023 import words
 from annelid_studies.riddle2023.contents import Findings, examination, findings
 from annelid_studies.riddle2023.examinations import design
 from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, SOFT, Columns, Point, Reading
 from annelid_studies.riddle2023.examinations.ranges import compiled_ranges
-from annelid_studies.riddle2023.words import CM, MM, PERCENT
+from annelid_studies.riddle2023.words import MM, PERCENT
 from annelid_studies.tables import tabulated
 from annelid_studies.worms import HOLD_S, TIGHT_CHAIN, Effort, chain, fast, one_after_the_other, rods
 
@@ -91,13 +88,11 @@ def _settling(effort: Effort) -> list[Case]:
     return [case.but(long) for case in (_HELD_TIGHT, _OWN_DAMPING)] if effort == "full" else []
 
 
-def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
+def _examine(store: Store, effort: Effort) -> Findings:
     points = [one._replace(value=tie_stiffness_N_per_m(one.hold)) for one in _points(effort) if one.hold]
     readings = design.read(points, store)
     groups = design.by_worm(readings)
     chains, sprung, [tight] = groups[PAPERS], groups[SOFT], groups[RIGID]
-    _draw(readings, stem)
-
     paper, stiffest = chains[0], chains[-1]
     paper_m, tight_m = paper.held_m[0], tight.held_m[0]
     own_m = design.held_elongation(store[_OWN_DAMPING])[0]
@@ -114,8 +109,6 @@ def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
         "tight_ring": _rings(tight)[0],
         "stiffest": sprung[-1].value,
         "reached": sprung[-1].held_m[0] / tight_m,
-        "n_chains": len(chains),
-        "n_sprung": len(sprung),
         "common": words.listed(f"{one.value:.0f}" for one in common),
         "largest": largest,
         "alike": ": the stiffness of the pins is what the two formulations have in common" if largest < 0.15 else "",
@@ -174,45 +167,6 @@ def _beside(value: float, reference: float) -> str:
     if abs(difference) < 0.005:
         return "the same as"
     return f"{PERCENT * abs(difference):.0f} % {'above' if difference > 0 else 'below'}"
-
-
-def _draw(readings: Sequence[Reading], stem: Path) -> None:
-    edge = 6.0 * max(one.value for one in readings if one.worm is not RIGID)
-    readings = [replace(one, value=min(one.value, edge)) for one in readings]
-    groups = design.by_worm(readings)
-    with canvas(5.2) as figure:
-        (elongation, gap), (ring, rhythm) = figure.subplots(2, 2)
-        for axes, numbers in (
-            (elongation, lambda one: CM * one.held_m),
-            (gap, lambda one: CM * one.at_holds("pin_gap_m")),
-            (ring, _rings),
-        ):
-            design.draw_over(axes, groups[SOFT], numbers)
-            design.draw_over(axes, groups[PAPERS], numbers, hollow=True)
-            if axes is not gap:
-                design.draw_over(axes, groups[RIGID], numbers, linestyle="none", markersize=6.0)
-        kinds = design.draw_rhythms(rhythm, readings)
-        decades = [10.0**k for k in range(1, 6) if 10.0**k < 0.2 * edge]
-        for axes, title, label in (
-            (elongation, "Elongation", "elongation, held (cm)"),
-            (gap, "Largest gap at a pin", "gap, held (cm)"),
-            (ring, "Ring", "length, held (m)"),
-            (rhythm, "Rhythm in closed loop", ""),
-        ):
-            design.label_panel(axes, title, "stiffness of a tie (N/m)", label, logarithmic=True)
-            axes.set_xticks([*decades, edge], [*(f"{value:g}" for value in decades), "rigid"])
-            axes.minorticks_off()
-            axes.set_xlim(9.0, 1.5 * edge)
-        elongation.set_ylim(bottom=0.0)
-        gap.set_yscale("log")
-        gap.minorticks_off()
-        steps = [0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0]
-        low, high = gap.get_ylim()
-        gap.set_yticks(shown := [step for step in steps if low <= step <= high], [f"{step:g}" for step in shown])
-        looks = (PAPERS, {"hollow": True}), (SOFT, {}), (RIGID, {"linestyle": "none"})
-        worms = [design.look_handle(**{**worm.look, "color": "0.25", **look}) for worm, look in looks]
-        design.legend_below(figure, [*design.segment_handles(), *worms, *kinds], 3)
-        save_both(figure, stem)
 
 
 def _cases(effort: Effort) -> list[Case]:

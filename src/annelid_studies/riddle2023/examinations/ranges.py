@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
 from typing import Any, NamedTuple
 
-from annelid.analysis import PAPER_MIDDLE_DEFICIT, middle_deficit
+from annelid.analysis import middle_deficit
 from annelid.body import worm_of
-from annelid.draw import canvas, save_both
 from annelid.experiment import Store
 from annelid.morphology import Array
 from annelid_studies.riddle2023 import words
 from annelid_studies.riddle2023.contents import Findings, examination, findings
 from annelid_studies.riddle2023.examinations import design
 from annelid_studies.riddle2023.examinations.design import PAPERS, WORMS, Point, Worm
-from annelid_studies.riddle2023.words import PERCENT
 from annelid_studies.tables import tabulated
 from annelid_studies.worms import Effort, chain, one_after_the_other
 
@@ -53,7 +50,7 @@ class _Loop(NamedTuple):
         return middle_deficit(self.elongation_m[reading])
 
 
-def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
+def _examine(store: Store, effort: Effort) -> Findings:
     readings = design.read(_points(effort), store)
     loops = []
     for pair in zip(readings[::2], readings[1::2], strict=True):
@@ -69,7 +66,6 @@ def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
                 loops.append(_Loop(one.worm, loop, ranges, (helix_m, mean_m), rhythm))
     rows = list(zip(loops[::2], loops[1::2], strict=True))
     opened, closed = rows[::2], rows[1::2]
-    _draw(rows, stem)
     first, first_equal = closed[0]
     shares = [1.0 - equal.deficit() / compiled.deficit() for compiled, equal in opened]
     low, high = zip(*compiled_ranges(), strict=True)
@@ -96,7 +92,6 @@ def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
         "left_open": _left(opened),
         "shares": shares,
         "most": ", which is most of it" if min(shares) > 0.5 else ", and the rest has other causes",
-        "paper": PAPER_MIDDLE_DEFICIT,
         "begin": " / ".join(f"{value:g}" for value in low),
         "end": " / ".join(f"{value:g}" for value in high),
         "above_cm": 100 * (low[1] - (low[0] + low[2]) / 2),
@@ -115,29 +110,6 @@ def _left(rows: Sequence[tuple[_Loop, _Loop]]) -> str:
         f"{words.in_percent(equal.deficit())} of {words.in_percent(compiled.deficit())} % ({equal.worm.label})"
         for compiled, equal in rows
     )
-
-
-def _draw(rows: Sequence[tuple[_Loop, _Loop]], stem: Path) -> None:
-    with canvas(1.2 + 0.42 * len(rows)) as figure:
-        panels = figure.subplots(1, 2, sharey=True, sharex=True)
-        for reading, (axes, title) in enumerate(zip(panels, ("First helix", "Mean of six springs"), strict=True)):
-            design.label_panel(axes, title, "segment 2 below segment 1 (%)", "")
-            for i, row in enumerate(rows):
-                compiled, equal = (PERCENT * one.deficit(reading) for one in row)
-                look = {**row[0].worm.look, "markersize": 7.0, "linestyle": "none"}
-                axes.plot([compiled, equal], [-i, -i], color="0.7", linewidth=2.0, zorder=1)
-                axes.plot([compiled], [-i], **look)
-                axes.plot([equal], [-i], **look, markerfacecolor="white", markeredgewidth=1.4)
-            axes.axvline(0.0, color="0.4", linewidth=0.8)
-            axes.grid(visible=False, axis="y")
-        paper = PERCENT * PAPER_MIDDLE_DEFICIT
-        line = panels[0].axvline(paper, color="0.2", linewidth=1.0, linestyle="-.", label="the paper")
-        panels[0].set_yticks([-i for i in range(len(rows))], [f"{one.worm.label},\n{one.loop} loop" for one, _ in rows])
-        panels[0].set_ylim(0.5 - len(rows), 0.5)
-        dots: dict[str, Any] = {"marker": "o", "linestyle": "none"}
-        kinds = [design.look_handle("as compiled", **dots), design.look_handle("equal", hollow=True, **dots)]
-        design.legend_below(figure, [*kinds, line])
-        save_both(figure, stem)
 
 
 RANGES = examination("ranges", lambda effort: design.cases_of(_points(effort)), _examine)

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from matplotlib.axes import Axes
 
 from annelid.body import worm_of
 from annelid.config import RunConfig
-from annelid.draw import canvas, save_both
 from annelid.experiment import Case, Outcome, Store
 from annelid.morphology import Array
 from annelid.simulation import open_run
@@ -19,7 +16,7 @@ from annelid_studies.riddle2023 import words
 from annelid_studies.riddle2023.contents import Findings, Number, examination, findings
 from annelid_studies.riddle2023.examinations import design
 from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, SOFT, Columns, Point, Reading, Worm
-from annelid_studies.riddle2023.words import CM, MS
+from annelid_studies.riddle2023.words import MS
 from annelid_studies.tables import tabulated
 from annelid_studies.worms import Effort, one_after_the_other
 
@@ -28,9 +25,6 @@ TRANSIENT_S = 0.1
 EARLY_S = 0.02
 """When the ring's length is compared with the muscle's limit, s."""
 PAPERS_STEP_MS = 1.0
-
-# Curves that end nearer than this share one label.
-_LABEL_SPAN_M = 0.05
 
 WALKS: Mapping[Effort, Mapping[Worm, Sequence[float]]] = {
     "quick": {PAPERS: (0.001, 0.002), SOFT: (0.010, 0.020), RIGID: (0.005, 0.010, 0.020)},
@@ -101,14 +95,13 @@ Starts = Mapping[Worm, Mapping[float, Start]]
 """Beginnings of a contraction by worm and step, ms."""
 
 
-def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
+def _examine(store: Store, effort: Effort) -> Findings:
     readings = design.read(_points(effort), store)
     walks = [one for one in readings if one.walk]
     starts: dict[Worm, dict[float, Start]] = {}
     for one in readings:
         if one.hold:
             starts.setdefault(one.worm, {})[one.value] = read_start(one.hold)
-    _draw(walks, starts, stem)
     own_walks = design.by_worm(walks)
     numbers: dict[str, Number] = {}
     early = []
@@ -139,9 +132,6 @@ def _examine(store: Store, effort: Effort, stem: Path) -> Findings:
         "walks": " ".join(map(_walks_in_words, own_walks.values())),
         "early": words.listed(early),
         "early_ms": MS * EARLY_S,
-        "transient_ms": MS * TRANSIENT_S,
-        "n_walks": len(walks),
-        "n_starts": sum(map(len, starts.values())),
         "lengths": lengths,
         "papers_step": papers_step,
         "speeds": words.listed(speeds),
@@ -200,47 +190,6 @@ def _settling_in_words(starts: Starts) -> tuple[str, str]:
         "An explicit step holds the muscle's force while the light pins gather speed, and so misses the steep fall "
         "of the force with velocity."
     )
-
-
-def _draw(walks: Sequence[Reading], starts: Starts, stem: Path) -> None:
-    with canvas(3.5) as figure:
-        left, right = figure.subplots(1, 2, width_ratios=[1.0, 1.15])
-        for own in design.by_worm(walks).values():
-            design.draw_over(left, own, lambda one: CM * one.walked_m[0])
-        design.cross_out(left, walks, lambda one: CM * one.walked_m[0])
-        steps = sorted({one.value for one in walks})
-        step, elongation = "physics time step (ms)", "elongation of segment 1 (cm)"
-        design.label_panel(left, "In closed loop", step, elongation, steps, logarithmic=True)
-        left.set_ylim(bottom=0.0)
-        _draw_starts(right, starts)
-        time, ring = "time after the onset (ms)", "ring of segment 1 (m)"
-        design.label_panel(right, "Beginning of the first contraction", time, ring)
-        handles = [design.look_handle(**worm.look) for worm in design.by_worm(walks)]
-        crossed = design.look_handle("does not walk 1-2-3", linestyle="none", marker="x", color="black", markersize=9.0)
-        design.legend_below(figure, [*handles, crossed], columns=3)
-        save_both(figure, stem)
-
-
-def _draw_starts(axes: Axes, starts: Starts) -> None:
-    thinnest = max(max(map(len, starts.values())) - 1, 1)
-    for worm, row in starts.items():
-        ordered = sorted(row, reverse=True)
-        for i, step in enumerate(ordered):
-            look = {"color": worm.color, "linestyle": worm.line, "linewidth": 2.2 - 1.4 * i / thinnest}
-            axes.plot(MS * row[step].time_s, row[step].ring_m, **look)
-        ends = {f"{step:g} ms": float(row[step].ring_m[-1]) for step in ordered}
-        if np.ptp(list(ends.values())) < _LABEL_SPAN_M:
-            ends = {f"{ordered[-1]:g} to {ordered[0]:g} ms": float(np.mean(list(ends.values())))}
-        beside = {"xytext": (4, 0), "textcoords": "offset points", "va": "center", "annotation_clip": False}
-        for text, end in ends.items():
-            axes.annotate(text, (MS * TRANSIENT_S, end), **beside, fontsize=7.5, color=worm.color)
-    every = [start for row in starts.values() for start in row.values()]
-    times = np.array([0.0, TRANSIENT_S])
-    limit = every[0].ring_m[0] - every[0].limit_m_per_s * times
-    axes.fill_between(MS * times, limit, 0.0, color="0.9", linewidth=0.0)
-    axes.plot(MS * times, limit, color="0.4", linewidth=1.0)
-    axes.set_xlim(0.0, MS * TRANSIENT_S)
-    axes.set_ylim(0.9 * min(start.ring_m.min() for start in every), 1.03 * every[0].ring_m[0])
 
 
 TIMESTEP = examination("timestep", lambda effort: design.cases_of(_points(effort)), _examine)

@@ -1,4 +1,4 @@
-"""Figures 2 and 8: how far a contraction deforms the mesh around it."""
+"""Figure 8: how far a contraction deforms the mesh around it."""
 
 from __future__ import annotations
 
@@ -8,19 +8,14 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.patches import Polygon
-from numpy.typing import NDArray
 
 from annelid.draw import WIDTH_IN, canvas, panel_title, picture_axes, save_both
 from annelid.morphology import Array, MeshGeometry
 from annelid.simulation import Run
-from annelid_studies.planar import rhombi as flat_rhombi
 from annelid_studies.riddle2023.figures.renderings import (
     Place,
     Posture,
-    draw_worm,
     recorded_posture,
-    rendering_works,
     rhombus_outline,
     show_worm,
 )
@@ -38,7 +33,7 @@ from annelid_studies.riddle2023.words import caption
 TIME_S = 1.5
 """The moment of the paper's figure 8, in the middle of the first contraction of segment 2."""
 FIGURE_8_DEG = (78.0, -30.0)
-GREEN, PINK, ORANGE = "#0f8a3c", "#e0409a", "#e8710a"
+GREEN, PINK = "#0f8a3c", "#e0409a"
 _CM, _PERCENT = 100.0, 100.0
 _GAP_M = 0.002
 """Pins that part from their strands by more than a strand's radius show in the pictures."""
@@ -107,64 +102,6 @@ def measure_propagation(run: Run, time_s: float = TIME_S) -> Propagation:
     return Propagation(posture, segment, beside, away, plane_means(distance, geometry), change)
 
 
-def figure_2_propagation(run: Run, stem: Path, time_s: float = TIME_S) -> str:
-    """Draws rhombi that deform alone beside the same row of the compliant worm; returns the caption.
-
-    Raises:
-        ConfigError: The worm is planar.
-        RunFileError: No posture was recorded at that time.
-    """
-    posture = recorded_posture(run, time_s)
-    geometry, segment = posture.geometry, _contracted(posture)
-    rings_own = np.flatnonzero(rhombus_plane(geometry) == geometry.ring_planes[segment])
-    # Seen from -y, the first segment is on the left.
-    outward = _outward(geometry.crossings_m, geometry)[rings_own]
-    start, away = int(rings_own[np.argmin(outward[:, 1])]), outward[np.argmin(outward[:, 1])]
-    row = _row(geometry, start)
-    own = int(np.flatnonzero(row == start)[0])
-    # Axial and lateral diagonals, m, each (2, n): at rest, in the mesh, and alone with rigid sides.
-    rest, mesh = (
-        np.stack(rhombus_diagonals(crossings, geometry.rhombi[row]))
-        for crossings in (geometry.crossings_m, posture.crossings_m)
-    )
-    width = np.where(np.arange(len(row)) == own, mesh[1], rest[1])
-    rigid = np.stack([np.sqrt((rest**2).sum(axis=0) - width**2), width])
-    change_alone, change = rigid[0] / rest[0], mesh[0] / rest[0]
-    with canvas(3.0) as figure:
-        left, right = figure.subplots(1, 2, sharex=True, sharey=True)
-        place = draw_worm(right, posture, (90.0, float(np.degrees(np.arcsin(-away[2])))), strength=0.45)
-        corners = place(posture.crossings_m[geometry.rhombi[row]])
-        alone = _CM * flat_rhombi(rigid[0], rigid[1])
-        alone += corners[own].mean(axis=0) - alone[own].mean(axis=0)
-        foot = float(right.get_ylim()[0])
-        _draw_row(left, alone, own, change_alone, foot)
-        _draw_row(right, corners, own, change, foot)
-        reach = np.concatenate([alone, corners])[..., 0]
-        right.set_xlim(min(right.get_xlim()[0], reach.min() - 1), max(right.get_xlim()[1], reach.max() + 1))
-        right.set_ylim(foot - 8.0, None)
-        figure.set_figheight(_height_over_width(right) * WIDTH_IN / 2 + 0.3)
-        # 10 cm above the left end.
-        bar, above = alone[..., 0].min(), alone[..., 1].max() + 2.5
-        left.plot([bar, bar + 10.0], [above, above], color="black", linewidth=2.0, solid_capstyle="butt")
-        left.text(bar + 5.0, above + 0.6, "10 cm", ha="center", va="bottom", fontsize=8)
-        panel_title(left, "a) without propagation: each rhombus alone")
-        panel_title(right, f"b) with propagation: the mesh at {posture.time_s:.2f} s")
-        save_both(figure, stem)
-    beside = [k for k in (own - 1, own + 1) if 0 <= k < len(row)]
-    found = {
-        "segment": segment + 1,
-        "alone": _change(float(change_alone[own])),
-        "time_s": posture.time_s,
-        "change": _change(float(change[own])),
-        "beside": _change(float(change[beside].mean())),
-        "rest": rest[0].sum(),
-        "rigid": rigid[0].sum(),
-        "mesh": mesh[0].sum(),
-        "pins": _pin_remark(posture, segment),
-    }
-    return caption(2, found)
-
-
 def figure_8_propagation(run: Run, stem: Path, time_s: float = TIME_S) -> str:
     """Shows a near and a far rhombus of the worm, and the deformation of all of them; returns the caption.
 
@@ -197,14 +134,12 @@ def figure_8_propagation(run: Run, stem: Path, time_s: float = TIME_S) -> str:
         handles, labels = axial.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=len(handles), columnspacing=1.4)
         save_both(figure, stem)
-    how = "rendered" if rendering_works() else "drawn from the recorded posture, not rendered"
     near, far = measured.near, measured.far
     distance, axial = np.abs(measured.plane_distance_m), plane_means(measured.change.axial, posture.geometry)
     most, last = int(np.argmax(np.abs(axial))), int(np.argmax(distance))
     found = {
         "segment": measured.segment + 1,
         "time_s": posture.time_s,
-        "how": how,
         "near_m": abs(near.distance_m),
         "near_muscle": _muscle(posture, near),
         "near": near.changes,
@@ -234,30 +169,6 @@ def _pin_remark(posture: Posture, segment: int) -> str:
     if gap_m < _GAP_M:
         return ""
     return f" The contracted ring's pins, which are tied softly, stand {_CM * gap_m:.1f} cm off their strands."
-
-
-def _row(geometry: MeshGeometry, start: int) -> NDArray[np.int64]:
-    """The rhombi that lie tip to tip with one of them, front to back."""
-    front, rear = geometry.rhombi[:, 0].tolist(), geometry.rhombi[:, 2].tolist()
-    row = [start]
-    while front[row[0]] in rear:
-        row.insert(0, rear.index(front[row[0]]))
-    while rear[row[-1]] in front:
-        row.append(front.index(rear[row[-1]]))
-    return np.array(row)
-
-
-def _draw_row(axes: Axes, corners: Array, own: int, change: Array, foot: float) -> None:
-    """Draws rhombi, shape ``(n, 4, 2)``, in cm, the contracted one apart, with their changes of length below."""
-    axes.set_axis_off()
-    axes.set_aspect("equal")
-    for k, quad in enumerate(corners):
-        style = {"edgecolor": ORANGE, "linewidth": 2.6, "hatch": "////"} if k == own else {"edgecolor": "black"}
-        axes.add_patch(Polygon(quad, closed=True, facecolor="none", zorder=6 if k == own else 5, **style))
-        text = _change(float(change[k])).removesuffix(" %")
-        axes.text(quad[:, 0].mean(), foot - 1.0, text, ha="center", va="top", fontsize=8)
-    middle = (corners[..., 0].min() + corners[..., 0].max()) / 2
-    axes.text(middle, foot - 5.0, "change of length (%)", ha="center", va="top", fontsize=8)
 
 
 def _height_over_width(axes: Axes) -> float:

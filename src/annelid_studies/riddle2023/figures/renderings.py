@@ -1,4 +1,4 @@
-"""The worm in one posture on a figure's axes, rendered or drawn, and figure 4: the model at rest."""
+"""The worm in one posture, rendered on a figure's axes, and figure 4: the model at rest."""
 
 from __future__ import annotations
 
@@ -9,28 +9,21 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from annelid.analysis import nearest_frame
 from annelid.body import worm_of
 from annelid.config import RunConfig
 from annelid.draw import (
     CONTRACTED,
-    CONTRACTED_WIDTH,
     PIN_RGBA,
-    SPRING_RGBA,
     STRAND_RGBA,
     VIEWS_DEG,
     Skeleton,
-    activation_color,
     canvas,
     find_backend,
-    fitting_distance,
     panel_title,
-    picture_axes,
-    picture_points,
     postures_of,
     render_still,
     save_both,
@@ -45,15 +38,7 @@ Place = Callable[[ArrayLike], Array]
 
 AXIAL_DEG = (0.0, 0.0)
 ISOMETRIC_DEG = VIEWS_DEG["isometric"]
-_CM = 100.0
 _PIXELS_PER_INCH = 220
-_LAYERS = 24
-_FARTHEST_SHARE = 0.3
-"""What lies farthest behind keeps this share of its colour."""
-_STRAND_WIDTH, _RING_WIDTH, _SPRING_WIDTH, _PIN_SIZE = 1.3, 2.0, 0.8, 9.0
-_HALO = 1.2
-_PIECES = 6
-"""Rings' and springs' straight lines are cut into this many pieces, each with a depth of its own."""
 
 
 @dataclass(frozen=True)
@@ -106,7 +91,7 @@ def _mesh(config: RunConfig) -> MeshGeometry:
 
 
 def rendering_works() -> bool:
-    """Whether pictures of the worm are rendered on this machine; otherwise they are drawn."""
+    """Whether pictures of the worm can be rendered on this machine."""
     try:
         find_backend()
     except RenderingUnavailable:
@@ -115,14 +100,12 @@ def rendering_works() -> bool:
 
 
 def show_worm(axes: Axes, posture: Posture, angles_deg: tuple[float, float], width_in: float) -> Place:
-    """Shows a posture on empty axes: rendered with OpenGL, or drawn with lines where there is none.
+    """Shows a posture on empty axes, rendered with OpenGL.
 
     The angles are azimuth and elevation of the line of sight; the width of the axes, inches, decides the resolution.
     """
     axes.set_axis_off()
     axes.set_aspect("equal")
-    if not rendering_works():
-        return draw_worm(axes, posture, angles_deg, perspective=True)
     side = int(width_in * _PIXELS_PER_INCH)
     still = render_still(posture.config, angles_deg, (side, side), qpos=posture.qpos, activation=posture.activation)
     axes.imshow(still.pixels)
@@ -130,85 +113,6 @@ def show_worm(axes: Axes, posture: Posture, angles_deg: tuple[float, float], wid
     axes.set_xlim(columns.min() - 4, columns.max() + 4)
     axes.set_ylim(rows.max() + 4, rows.min() - 4)
     return still.places
-
-
-def draw_worm(
-    axes: Axes, posture: Posture, angles_deg: tuple[float, float], *, perspective: bool = False, strength: float = 1.0
-) -> Place:
-    """Draws a posture on empty axes with lines; what lies behind is paler and crossed over.
-
-    Args:
-        axes: The axes.
-        posture: The worm.
-        angles_deg: Azimuth and elevation of the line of sight.
-        perspective: As the renderer's camera sees it; by default in parallel projection, in cm.
-        strength: Share of the colours that the nearest parts keep, in (0, 1].
-    """
-    right, up, sight = picture_axes(*angles_deg)
-    pieces, colors, widths = _lines(posture)
-    target = (pieces.min(axis=(0, 1)) + pieces.max(axis=(0, 1))) / 2
-    distance = fitting_distance(pieces.reshape(-1, 3) - target, *angles_deg, 1.0)
-
-    def place(points_m: ArrayLike) -> Array:
-        points = np.asarray(points_m, dtype=float) - target
-        if perspective:
-            return _CM * picture_points(points, *angles_deg, distance, 1.0) * [1.0, -1.0]
-        return _CM * np.stack([points @ right, points @ up], axis=-1)
-
-    depth = pieces.mean(axis=1) @ sight
-    near, far = depth.min(), depth.max()
-    bounds = np.linspace(far, near, _LAYERS + 1)[1:-1]
-
-    def faded(colors: Array, depth: Array) -> tuple[Array, NDArray[np.intp]]:
-        """Colours mixed with white the more the farther behind, and the layer of each depth."""
-        share = strength * (1.0 - (1.0 - _FARTHEST_SHARE) * np.clip((depth - near) / (far - near), 0, 1))
-        return 1.0 - share[:, None] * (1.0 - colors), np.searchsorted(-bounds, -depth)
-
-    colors, layers = faded(colors, depth)
-    pins, pin_layers = faded(np.array([PIN_RGBA[:3]]), posture.crossings_m @ sight)
-    flat, flat_pins = place(pieces), place(posture.crossings_m)
-    for layer in range(_LAYERS):
-        own, at, height = layers == layer, pin_layers == layer, 2 + layer / _LAYERS
-        for color, width, cap in (("white", widths[own] + _HALO, "butt"), (colors[own], widths[own], "round")):
-            lines = LineCollection(list(flat[own]), colors=color, linewidths=width, capstyle=cap, zorder=height)
-            axes.add_collection(lines)
-        # A pin is thicker than the strands that meet in it.
-        axes.scatter(*flat_pins[at].T, s=_PIN_SIZE, c=pins[at], linewidths=0, zorder=height + 1.5 / _LAYERS)
-    low, high = flat.min(axis=(0, 1)), flat.max(axis=(0, 1))
-    room = 0.015 * float((high - low).max())
-    axes.set(xlim=(low[0] - room, high[0] + room), ylim=(low[1] - room, high[1] + room))
-    return place
-
-
-def _lines(posture: Posture) -> tuple[Array, Array, Array]:
-    """Straight pieces of strands, springs and rings, shape ``(n, 2, 3)``, their colours and their widths."""
-    geometry, crossings = posture.geometry, posture.crossings_m
-    n_segments = geometry.n_segments
-    strands = np.stack([posture.strands_m[:, :-1], posture.strands_m[:, 1:]], axis=2)
-    strand_colors = np.repeat([color[:3] for color in STRAND_RGBA], strands[0].shape[0] * geometry.n_per_plane, axis=0)
-    springs = _cut(crossings[geometry.springs])
-    rings = _cut(np.stack([crossings[geometry.rings], crossings[np.roll(geometry.rings, -1, axis=1)]], axis=2))
-    if posture.activation is None:
-        contraction = np.zeros(n_segments)
-        ring_colors, spring_color = np.tile(CONTRACTED, (n_segments, 1)), CONTRACTED
-    else:
-        contraction = posture.activation.reshape(n_segments, -1).mean(axis=1)
-        ring_colors, spring_color = np.array([activation_color(a) for a in contraction]), SPRING_RGBA[:3]
-    n_ring = len(rings) // n_segments
-    ring_widths = np.repeat(_RING_WIDTH * (1.0 + (CONTRACTED_WIDTH - 1.0) * contraction), n_ring)
-    widths = [np.full(len(strand_colors), _STRAND_WIDTH), np.full(len(springs), _SPRING_WIDTH), ring_widths]
-    return (
-        np.concatenate([strands.reshape(-1, 2, 3), springs, rings]),
-        np.concatenate([strand_colors, np.tile(spring_color, (len(springs), 1)), np.repeat(ring_colors, n_ring, 0)]),
-        np.concatenate(widths),
-    )
-
-
-def _cut(lines: Array) -> Array:
-    """Cuts straight lines, shape ``(..., 2, 3)``, into pieces one after the other, shape ``(n, 2, 3)``."""
-    share = np.linspace(0.0, 1.0, _PIECES + 1)[:, None]
-    points = lines[..., :1, :] * (1.0 - share) + lines[..., 1:, :] * share
-    return np.stack([points[..., :-1, :], points[..., 1:, :]], axis=-2).reshape(-1, 2, 3)
 
 
 def rhombus_outline(posture: Posture, rhombus: int) -> Array:
@@ -247,6 +151,5 @@ def figure_4_model(config: RunConfig, stem: Path) -> str:
         figure.legend(handles=handles, loc="outside lower center", ncols=4)
         save_both(figure, stem)
     geometry = posture.geometry
-    how = "rendered by MuJoCo" if rendering_works() else "drawn from the mesh's coordinates, not rendered"
-    found = {"how": how, "geometry": geometry, "half": geometry.n_per_plane, "springs": len(geometry.springs)}
+    found = {"geometry": geometry, "half": geometry.n_per_plane, "springs": len(geometry.springs)}
     return caption(4, found)

@@ -5,6 +5,7 @@ These belong together: a run is made of kinds, and a kind is checked against its
 
 from __future__ import annotations
 
+import warnings
 from abc import abstractmethod
 from collections.abc import Iterator, Mapping
 from functools import cache
@@ -423,10 +424,14 @@ class RunConfig(Section):
     @model_validator(mode="after")
     def _intervals_divide_the_run(self) -> Self:
         step = self.clock.control_timestep_s
+        if not is_multiple(self.duration_s, step):
+            whole = float(f"{max(round(self.duration_s / step), 1) * step:.9g}")
+            was = f"duration_s = {self.duration_s:g}"
+            warnings.warn(f"{was} is taken as {whole:g}, a whole number of control steps", stacklevel=2)
+            self.__dict__["duration_s"] = whole  # The section is frozen.
         for field, value in (
             ("record.signals_interval_s", self.record.signals_interval_s),
             ("record.frames_interval_s", self.record.frames_interval_s),
-            ("duration_s", self.duration_s),
         ):
             if not is_multiple(value, step):
                 raise ValueError(

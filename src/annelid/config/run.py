@@ -5,6 +5,7 @@ These belong together: a run is made of kinds, and a kind is checked against its
 
 from __future__ import annotations
 
+import warnings
 from abc import abstractmethod
 from collections.abc import Iterator, Mapping
 from functools import cache
@@ -139,7 +140,6 @@ class BodyKind(Checked, Kind):
         needs_arena: Whether it stands on an arena, the default one where none is given.
         is_planar: Whether it moves in one plane, and is drawn from its side.
         has_skin: Whether the sides of its segments feel touch.
-        touches_ground: Whether anything of the body bears on a ground or a wall.
         can_be_pushed: Whether a trial may push it.
         is_papers: Whether it is in the paper's own formulation, which others are compared with.
         has_rigid_crossings: Whether the two strands of a crossing share a point.
@@ -154,7 +154,6 @@ class BodyKind(Checked, Kind):
     needs_arena: ClassVar[bool] = False
     is_planar: ClassVar[bool] = False
     has_skin: ClassVar[bool] = False
-    touches_ground: ClassVar[bool] = True
     can_be_pushed: ClassVar[bool] = False
     segments_field: ClassVar[str] = "body.n_segments"
     frame_size: ClassVar[tuple[int, int]] = (1280, 800)
@@ -437,10 +436,14 @@ class RunConfig(Section):
     @model_validator(mode="after")
     def _intervals_divide_the_run(self) -> Self:
         step = self.clock.control_timestep_s
+        if not is_multiple(self.duration_s, step):
+            whole = float(f"{max(round(self.duration_s / step), 1) * step:.9g}")
+            was = f"duration_s = {self.duration_s:g}"
+            warnings.warn(f"{was} is taken as {whole:g}, a whole number of control steps", stacklevel=2)
+            self.__dict__["duration_s"] = whole  # The section is frozen.
         for field, value in (
             ("record.signals_interval_s", self.record.signals_interval_s),
             ("record.frames_interval_s", self.record.frames_interval_s),
-            ("duration_s", self.duration_s),
         ):
             if not is_multiple(value, step):
                 raise ValueError(

@@ -45,6 +45,19 @@ DUMP, START, STOP = CALLGRIND + 3, CALLGRIND + 4, CALLGRIND + 5
 """``CALLGRIND_DUMP_STATS_AT``, ``_START_INSTRUMENTATION`` and ``_STOP_INSTRUMENTATION`` of its callgrind.h."""
 # The C library's copies by one long instruction would count once for every byte, and only where a processor has them.
 STEADY = {"PYTHONHASHSEED": "0", "OPENBLAS_NUM_THREADS": "1", "GLIBC_TUNABLES": "glibc.cpu.hwcaps=-ERMS"}
+YARDSTICK = """
+<mujoco>
+  <option integrator="implicitfast"/>
+  <worldbody>
+    <body><freejoint/><geom size=".1" mass="1"/>
+      <replicate count="40" euler="0 0 9"><body pos=".2 0 0"><joint axis="0 1 0" damping=".1"/><geom size=".05"/>
+        <body pos=".2 0 0"><joint axis="0 0 1" damping=".1"/><geom size=".05"/></body></body></replicate>
+    </body>
+    <geom type="plane" size="1 1 1" pos="0 0 -.06"/>
+  </worldbody>
+</mujoco>
+"""
+"""A body of the engine's own with contacts, none of it annelid's."""
 
 
 def step_a_worm(n_segments: int) -> None:
@@ -66,7 +79,6 @@ def step_the_loop(path: Path) -> None:
     from annelid import load_config
     from annelid.simulation import WormPlant, build_controller, start
     from annelid.simulation.loop import RecordedRun
-    from annelid_studies.bench.timing import YARDSTICK
 
     page = mmap.mmap(-1, mmap.PAGESIZE, prot=mmap.PROT_READ | mmap.PROT_WRITE | mmap.PROT_EXEC)
     page.write(REQUEST)

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import re
 import tomllib
+import warnings
 from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from annelid.body.worm import WormBody
 from annelid.config import (
@@ -176,7 +179,6 @@ def test_a_bad_value_is_named_with_what_would_be_valid(subtests: pytest.Subtests
         ("duration_s=0", "duration_s = 0: must be greater than 0"),
         ("clock.physics_timestep_s=0.0033", "integer multiple"),
         ("record.frames_interval_s=0.0405", "record.frames_interval_s = 0.0405 must be an integer multiple"),
-        ("duration_s=1.0005", "duration_s = 1.0005 must be an integer multiple"),
         ("record.signals_interval_s=0.0015", "record.signals_interval_s = 0.0015 must be an integer multiple"),
         ("body.formulation.kind=chian", "'chian': must be one of 'rods', 'chain'; did you mean 'chain'?"),
         ("controller.kind=sns-robst", "did you mean 'sns-robust'"),
@@ -196,6 +198,24 @@ def test_a_bad_value_is_named_with_what_would_be_valid(subtests: pytest.Subtests
             with pytest.raises(ConfigError, match=sentence) as caught:
                 load_config("riddle2023", parse_assignments([assignment]))
             assert "\n" not in str(caught.value)
+
+
+@given(duration_s=st.floats(1e-3, 100.0), step_s=st.sampled_from([0.001, 0.00035, 0.00079]))
+def test_a_duration_becomes_the_nearest_whole_number_of_steps(duration_s: float, step_s: float) -> None:
+    clock = {
+        "clock.control_timestep_s": step_s,
+        "clock.physics_timestep_s": step_s,
+        "record.signals_interval_s": step_s,
+    }
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        config = load_config("riddle2023", {**clock, "record.frames_interval_s": step_s, "duration_s": duration_s})
+    assert config.duration_s == pytest.approx(max(round(duration_s / step_s), 1) * step_s, rel=1e-6)
+
+
+def test_a_changed_duration_is_said() -> None:
+    with pytest.warns(UserWarning, match=r"duration_s = 1\.0005 is taken as 1, a whole number"):
+        assert load_config("riddle2023", {"duration_s": 1.0005}).duration_s == 1.0
 
 
 def test_gone_fields_that_did_nothing_are_left_out_and_others_refused(tmp_path: Path) -> None:
@@ -277,7 +297,7 @@ def test_names_that_have_moved_are_found_with_a_warning() -> None:
 
     for package, name in (
         (annelid.analysis, "detect_slip"),
-        (annelid.nervous, "phase_chain"),
+        (annelid.nervous, "PhaseStepper"),
         (annelid.nervous, "import_network"),
         (annelid.export, "Firmware"),
         (annelid.export, "lems_text"),

@@ -8,13 +8,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from annelid.body.constraint_rows import tendons_to_rows
 from annelid.body.formulations.chain.capsules import add_chain
-from annelid.body.formulations.rods import Rods
-from annelid.body.formulations.rods.net import add_rod, add_vertex, lumped_masses
-from annelid.body.formulations.rods.strains import RodStrains, vertex_stiffness
-from annelid.body.formulations.rods.two_step import TwoStep
 from annelid.body.mesh import Strands
+from cantilevers import RodCantilever
 
 LENGTH_M = 0.6
 ELEMENTS = 24
@@ -31,39 +27,11 @@ SOFTER = 0.25
 STEPPED = np.where(np.arange(1, ELEMENTS) <= STEP, [[1.0], [1.0]], [[SOFTER], [0.5]])
 
 
-CLAMP_KG = 1e6
-"""Also the inertia of the clamped edge's hinge, kg m^2."""
-
-
-class RodCantilever:
-    """A rod whose first edge is held by mass, as rows know no fixed vertices."""
-
-    def __init__(self, shares: np.ndarray | None = None) -> None:
-        spec = mujoco.MjSpec()
-        spec.option.gravity = [0, 0, 0]
-        spec.option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
-        spec.option.solver = mujoco.mjtSolver.mjSOL_NEWTON
-        spec.option.timestep, spec.option.tolerance = 0.005, 1e-20
-        masses = lumped_masses(VERTICES, STRANDS.one_number("linear_density_kg_per_m"))
-        masses[:2] = CLAMP_KG
-        bodies = [f"v{index}" for index in range(ELEMENTS + 1)]
-        for body, place, mass in zip(bodies, VERTICES, masses, strict=True):
-            add_vertex(spec, body, place, mass)
-        shares = np.ones((2, ELEMENTS - 1)) if shares is None else shares
-        stiffness = vertex_stiffness(np.full(ELEMENTS, ELEMENT_M), STRANDS, shares)
-        add_rod(spec, "strand_0", VERTICES, bodies, STRANDS, Rods().edge_time_constant_s, stiffness_Nm=stiffness)
-        spec.joint("strand_0_twist_0").armature = CLAMP_KG
-        tendons_to_rows(spec)
-        self.model = spec.compile()
-        self.data = mujoco.MjData(self.model)
-        strains = RodStrains(self.model, stiffness[:, np.newaxis], STRANDS.damping_time_s)
-        self._two_step = TwoStep(self.model, self.data, strains, first_order=False)
-
-    def settle(self, seconds: float) -> None:
-        for _ in range(round(seconds / (1.5 * self.model.opt.timestep))):
-            self._two_step.step(lambda: None)
-        mujoco.mj_kinematics(self.model, self.data)
-        assert np.abs(self.data.qvel).max() < 2e-4, "the rod has not come to rest"
+def settled(rod: RodCantilever, seconds: float) -> None:
+    for _ in range(round(seconds / (1.5 * rod.model.opt.timestep))):
+        rod.two_step.step(lambda: None)
+    mujoco.mj_kinematics(rod.model, rod.data)
+    assert np.abs(rod.data.qvel).max() < 2e-4, "the rod has not come to rest"
 
 
 def chain_cantilever(shares: np.ndarray | None = None) -> mujoco.MjModel:
@@ -96,11 +64,11 @@ def tip_deflection(load_N: float, shares: np.ndarray | None = None) -> float:
 
 @pytest.mark.parametrize("shares", [None, STEPPED], ids=["even", "stepped"])
 def test_tip_of_a_rod_cantilever_follows_beam_theory(shares: np.ndarray | None) -> None:
-    rod = RodCantilever(shares)
+    rod = RodCantilever(VERTICES, STRANDS, 0.005, shares)
     load, data = 2e-4, rod.data
     tip = rod.model.body(f"v{ELEMENTS}").id
     data.xfrc_applied[tip, 2] = load
-    rod.settle(8.0)
+    settled(rod, 8.0)
     assert data.xpos[tip, 2] == pytest.approx(tip_deflection(load, shares), rel=0.01)
 
 
@@ -120,10 +88,10 @@ def test_tip_of_a_chain_cantilever_follows_beam_theory(shares: np.ndarray | None
 def test_a_twisted_rod_turns_by_torque_times_length_over_torsion_stiffness(
     shares: np.ndarray | None, softer: float
 ) -> None:
-    rod = RodCantilever(shares)
+    rod = RodCantilever(VERTICES, STRANDS, 0.005, shares)
     torque, hinge = 2e-3, rod.model.joint("strand_0_twist")
     rod.data.qfrc_applied[hinge.dofadr[0]] = torque
-    rod.settle(2.0)
+    settled(rod, 2.0)
     turned = rod.data.qpos[hinge.qposadr[0]]
     behind = LENGTH_M - (STEP + 0.5) * ELEMENT_M - ELEMENT_M / 2
     compliance = (LENGTH_M - ELEMENT_M - behind + behind / softer) / TORSION

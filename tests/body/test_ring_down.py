@@ -10,7 +10,6 @@ frequencies come from the equations of a continuous, inextensible rod, solved by
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from math import pi, sqrt
@@ -22,16 +21,13 @@ import pytest
 from numpy.typing import NDArray
 from scipy.linalg import eig
 
-from annelid.body.constraint_rows import HELD, tendons_to_rows
+from annelid.body.constraint_rows import HELD
 from annelid.body.formulations import BDF2_SHARE
 from annelid.body.formulations.chain.capsules import add_chain
-from annelid.body.formulations.rods import Rods
-from annelid.body.formulations.rods.net import add_rod, add_vertex, lumped_masses
-from annelid.body.formulations.rods.strains import RodStrains, vertex_stiffness
-from annelid.body.formulations.rods.two_step import TwoStep
 from annelid.body.mesh import Strands
 from annelid.morphology import Array
 from annelid.simulation import worm as _engine_warnings_go_to_the_log  # noqa: F401
+from cantilevers import CLAMP_KG, RodCantilever
 
 Motion = Literal["in plane", "across", "twist"]
 Formulation = Literal["rods", "chain"]
@@ -47,8 +43,6 @@ LONG_STEP = 0.1
 """Likewise, where a step of first order would double the damping; one of second order adds a quarter of its cube."""
 DISPLACEMENT = 1e-4
 """Of the rod's length, or rad: small enough for linear theory."""
-CLAMP_KG = 1e6
-"""Also the inertia of the clamped edge's hinge, kg m^2."""
 SAMPLES = 24
 """Of a ring-down, spread over a period where the step allows."""
 MESHES, STEPS_S = (2, 3, 4, 6, 8), (0.0005, 0.001, 0.002, 0.005, 0.01, 0.02)
@@ -144,66 +138,23 @@ def rod_modes(curvature: float, torsion: float, length_m: float, order: int = 32
     return np.sqrt(squares.real[rising]), energy[1:4] / energy.sum(axis=0)
 
 
-def stiffness_of(vertices: Array, strands: Strands) -> Array:
-    lengths = np.linalg.norm(np.diff(vertices, axis=0), axis=1)
-    return vertex_stiffness(lengths, strands, np.ones((2, len(lengths) - 1)))
-
-
-def rod(case: Case, elements: int, strands: Strands, step_s: float) -> mujoco.MjSpec:
-    """Builds a rod as of a moving worm, whose rows know no fixed vertices: mass clamps it."""
-    spec = mujoco.MjSpec()
-    spec.option.timestep = BDF2_SHARE * step_s
-    spec.option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
-    spec.option.solver = mujoco.mjtSolver.mjSOL_NEWTON
-    spec.option.tolerance = 1e-20
-    vertices = case.vertices(elements)
-    masses = lumped_masses(vertices, strands.one_number("linear_density_kg_per_m"))
-    masses[:2] = CLAMP_KG
-    bodies = [f"v{index}" for index in range(elements + 2)]
-    for body, vertex, mass in zip(bodies, vertices, masses, strict=True):
-        add_vertex(spec, body, vertex, mass)
-    add_rod(
-        spec,
-        "strand_0",
-        vertices,
-        bodies,
-        strands,
-        Rods().edge_time_constant_s,
-        stiffness_Nm=stiffness_of(vertices, strands),
-    )
-    spec.joint("strand_0_twist_0").armature = CLAMP_KG
-    tendons_to_rows(spec)
-    return spec
-
-
-def chain(case: Case, elements: int, strands: Strands, step_s: float) -> mujoco.MjSpec:
-    spec = mujoco.MjSpec()
-    spec.option.timestep = step_s
-    spec.option.integrator = mujoco.mjtIntegrator.mjINT_EULER
-    add_chain(spec, "rod", case.vertices(elements), strands, 0.0, root=0, fixed_root=True)
-    return spec
-
-
-BUILDERS: dict[str, Callable[[Case, int, Strands, float], mujoco.MjSpec]] = {
-    "rods": rod,
-    "chain": chain,
-}
-
-
 class Cantilever:
     """A cantilever that is put into a state and stepped; a state holds displacements, then velocities."""
 
     def __init__(self, formulation: str, case: Case, elements: int, damping_s: float, step_s: float) -> None:
-        strands = Strands(damping_time_s=damping_s)
-        spec = BUILDERS[formulation](case, elements, strands, step_s)
-        spec.option.gravity = [0.0, 0.0, 0.0]
-        self.model = spec.compile()
-        self.data = mujoco.MjData(self.model)
+        strands, vertices_m = Strands(damping_time_s=damping_s), case.vertices(elements)
         self.strains = self.two_step = None
-        if self.model.nflex:
-            stiffness = stiffness_of(case.vertices(elements), strands)[:, np.newaxis]
-            self.strains = RodStrains(self.model, stiffness, damping_s)
-            self.two_step = TwoStep(self.model, self.data, self.strains, first_order=False)
+        if formulation == "rods":
+            rod = RodCantilever(vertices_m, strands, BDF2_SHARE * step_s)
+            self.model, self.data, self.strains, self.two_step = rod.model, rod.data, rod.strains, rod.two_step
+        else:
+            spec = mujoco.MjSpec()
+            spec.option.gravity = [0.0, 0.0, 0.0]
+            spec.option.timestep = step_s
+            spec.option.integrator = mujoco.mjtIntegrator.mjINT_EULER
+            add_chain(spec, "rod", vertices_m, strands, 0.0, root=0, fixed_root=True)
+            self.model = spec.compile()
+            self.data = mujoco.MjData(self.model)
         held = [self.model.joint(joint).name == HELD for joint in self.model.dof_jntid]
         self.free = (self.model.dof_M0 < CLAMP_KG) & ~np.array(held)
 
@@ -346,7 +297,7 @@ def test_a_cantilever_of_rods_does_so_at_steps_that_would_double_its_damping_oth
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", CASES, ids=str)
-@pytest.mark.parametrize("formulation", BUILDERS)
+@pytest.mark.parametrize("formulation", ["rods", "chain"])
 def test_errors_fall_with_the_mesh_and_with_the_step(formulation: Formulation, case: Case) -> None:
     """Prints the errors of frequency and decrement; a dash where the motion is overdamped or unstable."""
     # The shortest is converged for every mesh.

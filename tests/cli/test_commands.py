@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import mujoco
+import imageio.v3
 import pytest
 from typer.main import get_command
 
@@ -62,18 +62,13 @@ def test_resume_goes_on_bit_for_bit(annelid: Command) -> None:
     common = ("--no-video", "-q")
     annelid("run", "riddle2022-planar", "--duration", "1", *common, "--out", "whole")
     annelid("run", "riddle2022-planar", "--duration", "0.4", *common, "--out", "first")
+    assert "--resume continues a run as it is" in annelid("run", "riddle2023", "--resume", "first").err
     done = annelid("run", "--resume", "first", "--duration", "1", *common, "--out", "second")
     assert done.exit_code == 0, done.err
     whole, second = open_run("whole").data, open_run("second").data
     assert float(second["time"][0]) > 0.39
     for name in ("potential", "stretch_length", "activation"):
         assert whole[name].isel(time=slice(-second.sizes["time"], None)).equals(second[name]), name
-
-
-def test_resume_takes_no_preset(annelid: Command, finished: Path) -> None:
-    done = annelid("run", "riddle2023", "--resume", finished)
-    assert done.exit_code == 2
-    assert "--resume continues a run as it is" in done.err
 
 
 def test_a_missing_back_end_costs_the_pictures_and_not_the_run(
@@ -86,7 +81,7 @@ def test_a_missing_back_end_costs_the_pictures_and_not_the_run(
     done = annelid("run", "riddle2023-rods", "--duration", "0.05", "--out", "rods")
     assert done.exit_code == 0
     assert sorted(p.name for p in Path("rods").iterdir()) == ["figure7.png", "run.nc"]
-    assert "no OpenGL back-end works here" in done.sentence()
+    assert "no OpenGL back-end works here" in done.err
 
 
 def test_plot_and_render_write_where_they_are_told(annelid: Command, finished: Path) -> None:
@@ -94,18 +89,12 @@ def test_plot_and_render_write_where_they_are_told(annelid: Command, finished: P
     assert Path("f.svg").read_text().lstrip().startswith("<?xml")
     assert annelid("draw", finished, "--figure", "network", "-o", "n.svg").out.split() == ["n.svg"]
     assert 'id="neuron-1"' in Path("n.svg").read_text()
-    done = annelid("draw", finished, "--time", "0.5", "-o", "frame.jpg", "--video", "v.mp4", "--fps", "5")
+    more = ("--video", "v.mp4", "--fps", "5", "--background", "dark")
+    done = annelid("draw", finished, "--time", "0.5", "-o", "frame.png", *more)
     assert done.exit_code == 0, done.err
-    assert done.out.split() == ["frame.jpg", "v.mp4"]
+    assert done.out.split() == ["frame.png", "v.mp4"]
+    assert imageio.v3.imread("frame.png")[0, 0].tolist()[:3] == [20, 22, 26]
     assert Path("v.mp4").stat().st_size > 1000
-
-
-def test_render_takes_a_background(annelid: Command, finished: Path) -> None:
-    import imageio.v3
-
-    done = annelid("draw", finished, "--time", "0.5", "-o", "dark.png", "--background", "dark")
-    assert done.exit_code == 0, done.err
-    assert imageio.v3.imread("dark.png")[0, 0, :3].tolist() == [20, 22, 26]
 
 
 def test_a_network_file_is_exported_and_kept_without_force(annelid: Command) -> None:
@@ -249,12 +238,6 @@ def test_arenas_are_listed_printed_built_and_walked_in(annelid: Command) -> None
     assert annelid("run", "--resume", "bent", "--arena", "floor").exit_code == 2
 
 
-def test_friction_that_depends_on_the_direction_is_not_written_as_another(annelid: Command) -> None:
-    refused = annelid("export", "--to", "mjcf", "riddle2023-rods", "--arena", "setae")
-    assert refused.exit_code == 2
-    assert "arena.backward_friction = 1.0 cannot be written" in refused.err
-
-
 def test_the_command_prints_findings_and_refuses(annelid: Command) -> None:
     assert annelid("check").out.strip() == "nothing found"
     assert annelid("check", "riddle2022-planar").exit_code == 0
@@ -267,13 +250,6 @@ def test_the_command_prints_findings_and_refuses(annelid: Command) -> None:
     assert refused.exit_code == 2
     assert "set [0.195, 0.3]" in refused.sentence()
     assert not Path("thin").exists()
-
-
-def test_a_robot_of_one_s_own_is_written_for_other_programs(annelid: Command) -> None:
-    robot = Path(__file__).parents[2] / "examples" / "robot" / "robot.xml"
-    done = annelid("export", robot, "--to", "mjcf", "-o", "new.xml")
-    assert done.exit_code == 0, done.err
-    assert mujoco.MjModel.from_xml_path("new.xml").nu == mujoco.MjModel.from_xml_path(str(robot)).nu
 
 
 def test_a_run_comes_before_a_preset_of_its_name(annelid: Command, finished: Path) -> None:

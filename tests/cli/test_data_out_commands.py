@@ -1,4 +1,4 @@
-"""The commands `export`, `compare`, `cite` and `doctor --report`, as typed."""
+"""The commands `export`, `compare` and `cite`, as typed."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from annelid.draw import doctor
 from annelid.simulation.runfile import open_run
 from outcome import Command
 
@@ -47,24 +46,19 @@ def test_named_files_are_not_replaced_without_force(annelid: Command, run: Path)
     assert [path.name for path in Path("full").iterdir()] == ["notes.txt"]
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
+def test_what_does_not_go_together_is_refused(annelid: Command, run: Path) -> None:
+    before = sorted(run.rglob("*"))
+    for arguments, words in (
         (("--to", "xlsx"), "unknown format 'xlsx'"),
         (("--to", "html", "--every", "2"), "--every has no effect on html, which takes --from-time, --to-time"),
         (("--to", "mjcf", "--to-time", "1"), "--to-time has no effect on mjcf, which takes the whole run"),
         (("--to", "mat", "-o", "run.csv"), "must end in .mat"),
         (("--to", "mjcf"), "needs the 3D worm"),
         (("--to", "csv", "--signals", "rings"), "no signal 'rings'"),
-    ],
-)
-def test_what_does_not_go_together_is_refused(
-    annelid: Command, run: Path, arguments: tuple[str, ...], words: str
-) -> None:
-    before = sorted(run.rglob("*"))
-    done = annelid("export", run, *arguments)
-    assert done.exit_code == 2
-    assert words in done.sentence()
+    ):
+        done = annelid("export", run, *arguments)
+        assert done.exit_code == 2
+        assert words in done.sentence()
     assert sorted(run.rglob("*")) == before
 
 
@@ -76,6 +70,7 @@ def test_compare_prints_a_table_and_draws_into_a_folder(annelid: Command, run: P
     assert sorted(path.name for path in Path("both").iterdir()) == ["comparison.json", "lengths.png", "potentials.png"]
     assert "travel.png not drawn" in done.sentence()
     assert "--force" in annelid("compare", run, finished, "-o", "both").sentence()
+    assert "at least two runs" in annelid("compare", run).err
 
 
 def test_compare_with_a_measured_log(annelid: Command, run: Path) -> None:
@@ -97,12 +92,6 @@ def test_compare_with_a_measured_log(annelid: Command, run: Path) -> None:
     assert "name both" in annelid("compare", run, "--map", "map.toml").err
 
 
-def test_compare_needs_two_runs(annelid: Command, run: Path) -> None:
-    done = annelid("compare", run)
-    assert done.exit_code == 2
-    assert "at least two runs" in done.err
-
-
 def test_cite_takes_a_run_a_preset_or_a_file(annelid: Command, run: Path) -> None:
     Path("mine.toml").write_text('extends = "riddle2022-planar"\n')
     for source in ("riddle2022-planar", run, "mine.toml"):
@@ -112,16 +101,6 @@ def test_cite_takes_a_run_a_preset_or_a_file(annelid: Command, run: Path) -> Non
         assert "todorov2012" not in done.out
 
 
-@pytest.mark.parametrize(
-    ("source", "words"), [("wangg", "did you mean 'wang'"), (".", "holds no run.nc"), ("no.toml", "no.toml")]
-)
-def test_cite_says_what_it_cannot_find(annelid: Command, source: str, words: str) -> None:
-    assert words in annelid("cite", source).sentence()
-
-
-def test_doctor_reports_in_markdown(annelid: Command, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(doctor, "works", lambda backend: True)
-    done = annelid("doctor", "--report")
-    assert done.out.startswith("- annelid: ")
-    assert "| numpy | ok |" in done.out
-    assert str(Path.home()) not in done.out
+def test_cite_says_what_it_cannot_find(annelid: Command) -> None:
+    for source, words in (("wangg", "did you mean 'wang'"), (".", "holds no run.nc"), ("no.toml", "no.toml")):
+        assert words in annelid("cite", source).sentence()

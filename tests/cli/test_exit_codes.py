@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 import subprocess
 import sys
@@ -12,7 +11,6 @@ from pathlib import Path
 import pytest
 
 from annelid.cli import entry
-from annelid.errors import RunKilled
 from annelid.experiment.sweep import Sweep
 from outcome import STUDY, Command
 
@@ -70,39 +68,11 @@ def test_a_sweep_tells_of_runs_that_a_guard_stopped(annelid: Command, monkeypatc
     assert "of 1 runs 1 were stopped by a guard" in done.err
 
 
-@pytest.mark.parametrize(
-    ("failed", "code"), [(0, entry.EXIT_DONE), (1, entry.EXIT_SOME_FAILED), (2, entry.EXIT_ALL_FAILED)]
-)
-def test_a_benchmark_tells_of_cases_that_were_not_measured(
-    annelid: Command, monkeypatch: pytest.MonkeyPatch, failed: int, code: int
-) -> None:
-    def bench(folder: Path, *_: object, **__: object) -> Path:
-        cases = [{"failed": "killed"}] * failed + [{}] * (2 - failed)
-        (folder / "bench.json").write_text(json.dumps({"cases": cases}))
-        return folder / "bench.json"
-
-    monkeypatch.setattr("annelid_studies.bench.benchmark.bench", bench)
-    monkeypatch.setattr("annelid_studies.bench.report.bench_figure", lambda *_: Path("bench.png"))
-    done = annelid("study", "bench", "--quiet")
-    assert done.exit_code == code, done.err
-    assert ("of 2 runs" in done.err) == bool(failed)
-
-
 def test_a_search_that_finds_no_gait_says_so(annelid: Command) -> None:
     words = ["riddle2022-planar", "--duration", "0.1", "--vary", "controller.gate_time_constant_ms=100:600"]
     done = annelid("tune", *words, "--trials", "1", "--quiet", "--jobs", "1")
     assert done.exit_code == entry.EXIT_ALL_FAILED, done.err
     assert "no trial walked" in done.err
-
-
-def test_a_study_whose_worker_dies_again_and_again_says_so(annelid: Command, monkeypatch: pytest.MonkeyPatch) -> None:
-    def killed(*_: object, **__: object) -> None:
-        raise RunKilled("its worker died 3 times")
-
-    monkeypatch.setattr("annelid_studies.riddle2023.paper.reproduce", killed)
-    done = annelid("paper", "--quiet")
-    assert done.exit_code == entry.EXIT_SOME_FAILED
-    assert done.sentence() == "its worker died 3 times"
 
 
 # One process a row: what is told there goes to streams of the system.

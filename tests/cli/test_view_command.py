@@ -23,27 +23,18 @@ def refusal(*words: str) -> str:
     return " ".join(result.output.split())
 
 
-def test_robots_of_a_file_and_unknown_presets_are_refused(tmp_path: Path) -> None:
+def test_what_cannot_be_viewed_or_served_is_refused(tmp_path: Path) -> None:
     (tmp_path / "robot.toml").write_text('[body]\nkind = "mjcf"\n')
     assert "cannot be viewed" in refusal(str(tmp_path / "robot.toml"))
     assert "did you mean 'riddle2023'" in refusal("ridle2023")
-
-
-def test_a_port_in_use_is_refused() -> None:
+    assert "there is no such address" in refusal("--no-open", "--host", "no.such.host.invalid")
+    assert "played as it was" in refusal(str(tmp_path), "--segments", "4")
+    assert "there is no run file" in refusal(str(tmp_path))
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         port = taken.getsockname()[1]
         assert f"--port {port} cannot be listened on" in refusal("--no-open", "--port", str(port))
-
-
-def test_an_address_that_is_none_is_refused() -> None:
-    assert "there is no such address" in refusal("--no-open", "--host", "no.such.host.invalid")
-
-
-def test_a_run_takes_no_changes(tmp_path: Path) -> None:
-    assert "played as it was" in refusal(str(tmp_path), "--segments", "4")
-    assert "there is no run file" in refusal(str(tmp_path))
 
 
 def test_a_page_is_not_overwritten_and_goes_without_a_window(tmp_path: Path) -> None:

@@ -11,10 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from annelid.analysis.paper import published
-from annelid.config import RunConfig, load_config, parse_assignments
+from annelid.config import RunConfig, load_config
 from annelid.control import ProgramController
 from annelid.control.open_loop import Contraction, Program
-from annelid.control.sns import Sns
 from annelid.errors import ConfigError
 from annelid.protocols import Sensation
 from annelid.simulation import simulate
@@ -102,42 +101,10 @@ def test_a_bad_contraction_is_refused_in_one_sentence(subtests: pytest.Subtests)
             assert "\n" not in str(caught.value)
 
 
-def test_a_bad_program_is_refused(subtests: pytest.Subtests) -> None:
-    for overrides, sentence in (
-        ({"controller.kind": "program"}, r"^controller\.contractions must be given$"),
-        (programmed(ONE, gate_time_constant_ms=250.0), "belongs to another kind. Valid here: contractions, kind"),
-        ({"controller.contractions": [ONE]}, "belongs to another kind"),
-    ):
-        with subtests.test(f"{overrides!r:.60}"), pytest.raises(ConfigError, match=sentence):
-            load_config("riddle2022-planar", overrides)
-
-
 def test_a_segment_must_exist_on_whatever_body() -> None:
     with pytest.raises(ConfigError, match=r"n_muscles = 5 .* give 3 \(rings\) or 6 \(half-rings\)"):
         ProgramController(program(), 3, 5)
     assert load_config("riddle2023-rods", {**programmed({**ONE, "segment": 4}), "body.mesh.n_segments": 4}).seed == 0
-
-
-def test_a_section_of_another_kind_keeps_nothing_of_the_preset_s(tmp_path: Path) -> None:
-    expected = Program(contractions=(Contraction(segment=1, start_s=0.0, stop_s=0.6),))
-    assert load_config("riddle2023-rods", programmed(ONE)).controller == expected
-    text = "controller.contractions=[{segment=1, start_s=0.0, stop_s=0.6}]"
-    for order in ([text, "controller.kind=program"], ["controller.kind=program", text]):
-        assert load_config("riddle2023-rods", parse_assignments(order)).controller == expected
-    file = tmp_path / "squeeze.toml"
-    file.write_text(
-        'extends = "riddle2023"\n[controller]\nkind = "program"\n'
-        "[[controller.contractions]]\nsegment = 1\nstart_s = 0.0\nstop_s = 0.6\n",
-        encoding="utf-8",
-    )
-    config = load_config(file)
-    assert config.controller == expected
-    assert config.body == load_config("riddle2023").body
-    again = tmp_path / "again.toml"
-    again.write_text(f'extends = "{file.as_posix()}"\n[controller]\nramp_s = 0.1\n', encoding="utf-8")
-    assert load_config(again).controller == expected.model_copy(update={"ramp_s": 0.1})
-    back = load_config({"extends": file.as_posix(), "controller": {"kind": "sns", "kick_nA": 2.0}})
-    assert back.controller == Sns(kick_nA=2.0)
 
 
 def test_it_is_listed_saved_and_not_laid_beside_the_paper() -> None:

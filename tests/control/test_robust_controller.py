@@ -61,15 +61,6 @@ def test_it_walks_from_a_random_start_after_two_turns(tmp_path: Path) -> None:
     assert (score.verdict, score.direction, score.wave_fronts) == ("ordered", 1, 1)
 
 
-def test_it_walks_the_planar_worm(tmp_path: Path) -> None:
-    n, period_s = 6, 6 * 0.875
-    simulate(planar(**{"body.n_segments": n, "duration_s": 2.6 * period_s}), tmp_path / "run", progress=False)
-    found = rhythm_score(open_run(tmp_path / "run"))
-    assert found.verdict == "ordered"
-    assert (found.direction, found.wave_fronts) == (1, 1)
-    assert found.period_s == pytest.approx(period_s, rel=0.1)
-
-
 def test_a_control_step_that_is_too_long_is_refused() -> None:
     with pytest.raises(ConfigError, match=r"clock.control_timestep_s = 0.005 must be at most 0.00"):
         robust(24, timestep_s=0.005)

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from annelid.control import CircuitController
-from annelid.nervous import Network, Neuron, PeristalsisParameters, Synapse, neuron_names, peristalsis_network
+from annelid.nervous import Network, Neuron, PeristalsisParameters, Synapse
 from annelid.nervous.peristalsis import waiting_network
 from annelid.protocols import Array
 
@@ -145,21 +145,3 @@ def test_whatever_the_sensors_say_a_memory_is_on(n_segments: int, held_ms: int) 
             stepper.advance(state, inputs_nA)
             least = min(least, state.potential[:, places].max(axis=1).min())
     assert least > 0.6 * 20.0
-
-
-@given(n_segments=st.integers(3, 12))
-def test_the_neurons_are_the_papers_and_a_memory_each(n_segments: int) -> None:
-    network, papers = waiting_network(n_segments), peristalsis_network(n_segments)
-    memories = [f"memory_{segment}" for segment in range(1, n_segments + 1)]
-    assert list(network.neurons) == [*neuron_names(n_segments), *memories]
-    assert [network.initial_mV[name] for name in memories] == [20.0, *[0.0] * (n_segments - 1)]
-    assert (network.inputs, network.outputs) == (papers.inputs, papers.outputs)
-    kept = [one for one in papers.connections if "relay" not in one.source + one.target]
-    assert network.connections[: len(kept)] == kept
-    assert len(network.connections) == len(kept) + 7 * n_segments
-
-
-def test_the_network_has_the_parameters_of_its_section() -> None:
-    found = waiting(gate_time_constant_ms=600.0).circuit.network
-    assert found.to_toml() == waiting_network(4, PeristalsisParameters(gate_time_constant_ms=600.0)).to_toml()
-    assert found.to_toml() != waiting_network(4).to_toml()

@@ -24,7 +24,7 @@ import annelid
 from annelid.errors import ConfigError, RunFileError
 from annelid.nervous import Network, Neuron, Synapse, peristalsis_network
 from annelid_lab.firmware import Firmware, HostFirmware, controller_firmware, network_firmware
-from annelid_lab.firmware.c_source import comment, identifier
+from annelid_lab.firmware.files import comment, identifier
 
 ROOT = Path(__file__).parents[2]
 COMPILER = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler called cc")

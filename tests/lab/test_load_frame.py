@@ -155,11 +155,8 @@ def test_a_ring_cannot_be_wound_away() -> None:
 HEXAGON = 0.16 * np.array([[0, np.cos(a), np.sin(a)] for a in np.pi / 3 * np.arange(6)])
 
 
-def test_a_round_ring_under_rising_tension_has_not_given_way() -> None:
-    assert frame.gave_way(HEXAGON, np.array([0.0, 2.0, 5.0, 4.9])) is None
-
-
 def test_a_flattened_ring_or_a_falling_tension_is_a_snap_through() -> None:
+    assert frame.gave_way(HEXAGON, np.array([0.0, 2.0, 5.0, 4.9])) is None
     flat = HEXAGON * [1.0, 1.0, 0.4]
     assert "from its centre" in (frame.gave_way(flat, np.array([0.0, 2.0])) or "")
     assert "fell from 5.0 to 2.0 N" in (frame.gave_way(HEXAGON, np.array([0.0, 5.0, 2.0])) or "")

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import signal
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -108,33 +105,6 @@ def test_a_large_file_is_compared_on_demand_only(run: Run, tmp_path: Path, monke
     done = CliRunner().invoke(app, ["show", str(path), "--verify"])
     assert done.exit_code == 2
     assert done.stderr.rstrip().endswith(f"{path} is damaged: it is not as it was when the run ended")
-
-
-def test_a_run_that_was_killed_carries_no_digest_and_opens(tmp_path: Path) -> None:
-    code = (
-        "import os, signal, annelid.simulation.digest as d\n"
-        "d.write = lambda *_: os.kill(os.getpid(), signal.SIGKILL)\n"
-        "from annelid.config import load_config\n"
-        "from annelid.simulation import simulate\n"
-        f"simulate(load_config('riddle2022-planar', {{'duration_s': 0.05}}), {str(tmp_path / 'run')!r}, progress=False)"
-    )
-    done = subprocess.run([sys.executable, "-c", code], check=False, timeout=120)
-    assert done.returncode == -signal.SIGKILL
-    assert open_run(tmp_path / "run").status == "complete"
-    assert "carries no digest" in verify_run(tmp_path / "run")
-
-
-@pytest.mark.parametrize("error", [KeyboardInterrupt(), OSError(5, "Input/output error")])
-def test_a_digest_that_cannot_be_written_ends_the_run_with_its_own_error(
-    error: BaseException, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def refuse(*_: object) -> None:
-        raise error
-
-    monkeypatch.setattr(digest, "write", refuse)
-    with pytest.raises(RunFileError if isinstance(error, OSError) else KeyboardInterrupt):
-        simulate(load_config("riddle2022-planar", {"duration_s": 0.05}), tmp_path / "run", progress=False)
-    assert open_run(tmp_path / "run").status == "complete"
 
 
 def test_a_run_whose_last_samples_cannot_be_written_is_not_complete(

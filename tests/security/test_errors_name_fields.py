@@ -56,6 +56,8 @@ def wrong(annotation: Any) -> list[Any]:
 
 
 def test_an_error_names_the_field_and_the_value(subtests: pytest.Subtests) -> None:
+    tried = {path for path, _, _ in CASES}
+    assert {"controller.turn_ms", "controller.descending.lift", "controller.network.range_mV"} <= tried
     for path, kinds, annotation in CASES:
         with subtests.test(path=path, kinds=kinds):
             whole = {k: v for k, v in kinds.items() if k != "body.kind" or v != "worm"}
@@ -83,12 +85,6 @@ def refusal(changes: dict[str, Any], path: str, value: Any) -> str:
     return sentence
 
 
-def test_every_section_has_been_tried() -> None:
-    tried = {path for path, _, _ in CASES}
-    assert {"controller.turn_ms", "controller.descending.lift", "controller.network.range_mV"} <= tried
-    assert len(CASES) > 200
-
-
 def test_a_kind_that_is_none_is_refused() -> None:
     sections = ("body", "body.rings", "body.formulation", "arena", "controller", "turning")
     kinds = ([1], {}, None, 3, float("inf"), "x" * 100_000, "nope", True)
@@ -98,31 +94,15 @@ def test_a_kind_that_is_none_is_refused() -> None:
         assert len(str(error.value)) < 500
 
 
-@pytest.mark.parametrize(
-    ("base", "size"),
-    [
-        ("riddle2023-rods", 1e-9),
-        *(
-            pytest.param(base, size, marks=pytest.mark.slow)
-            for base in ("riddle2023-rods", "riddle2025", "riddle2023")
-            for size in (1e-300, 1e-6, 1e-3, 0.0, 1e3, 1e9, 1e15)
-        ),
-    ],
-)
-def test_the_engine_refuses_nothing_that_the_configuration_takes(base: str, size: float) -> None:
+def test_the_engine_refuses_nothing_that_the_configuration_takes() -> None:
     """What the engine says of a body is told by fields, and nothing else escapes from building it."""
     from annelid.body.assemble import mjcf_text
 
-    config = load_config(base, {"body.mesh.elements_per_side": 1})
-    numbers = [
-        path
-        for path, kinds, annotation in CASES
-        if path.startswith("body.")
-        and "float" in str(annotation)
-        and "tuple" not in str(annotation)
-        and all(getattr(config.body, k.split(".")[1], None) is not None for k in kinds if k.count(".") > 1)
-    ]
-    for path in numbers:
-        with warnings.catch_warnings(), suppress(ConfigError):
-            warnings.simplefilter("ignore")
-            mjcf_text(load_config(base, {"body.mesh.elements_per_side": 1, path: size}))
+    coarse = {"body.mesh.elements_per_side": 1}
+    body = load_config("riddle2023-rods", coarse).body
+    for path, kinds, annotation in CASES:
+        there = all(getattr(body, k.split(".")[1], None) is not None for k in kinds if k.count(".") > 1)
+        if there and path.startswith("body.") and "float" in str(annotation) and "tuple" not in str(annotation):
+            with warnings.catch_warnings(), suppress(ConfigError):
+                warnings.simplefilter("ignore")
+                mjcf_text(load_config("riddle2023-rods", {**coarse, path: 1e-9}))

@@ -9,7 +9,6 @@ import os
 import re
 import subprocess
 import sys
-import tempfile
 import xml.etree.ElementTree as ET
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -26,7 +25,7 @@ from annelid.config import load_config
 from annelid.draw.canvas import canvas, panel_title, save
 from annelid.draw.figures.network_diagram import network_figure, network_svg
 from annelid.draw.figures.sweep import sweep_figure
-from annelid.errors import AnnelidError
+from annelid.errors import AnnelidError, ConfigError
 from annelid.nervous import Network, Neuron
 from annelid.output import write_csv
 from annelid.simulation.runfile import Run, open_run
@@ -103,17 +102,16 @@ def hostile(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
     return changed
 
 
-def test_a_name_is_one_line_of_printable_text(subtests: pytest.Subtests, tmp_path: Path) -> None:
+def test_a_name_is_one_line_of_printable_text(tmp_path: Path) -> None:
     for text in ("\x1b[2J", "\u202egnp.exe", "\x00", "two\nlines", "a\ttab", "x" * 201):
-        with subtests.test(f"{text!r:.60}"):
-            folder = Path(tempfile.mkdtemp(dir=tmp_path))
-            file = folder / "my.toml"
-            file.write_text(f'extends = "riddle2022-planar"\nname = {json.dumps(text)}\n', encoding="utf-8")
-            for field in ("name", "summary") if len(text) < 200 else ("name",):
-                said = annelid("run", file, "--out", folder / "run", "--set", f"{field}={json.dumps(text)}", code=2)
-                assert "name" in said
-                assert not (folder / "run").exists()
-            assert load_config("riddle2022-planar", {"name": "Regenwurm \U0001fab1 \u5c3a\u8816 \u00a7"}).name
+        said = annelid(
+            "run", "riddle2022-planar", "--out", tmp_path / "run", "--set", f"name={json.dumps(text)}", code=2
+        )
+        assert "name" in said
+    with pytest.raises(ConfigError, match="summary"):
+        load_config("riddle2022-planar", {"summary": "\x1b[2J"})
+    assert not (tmp_path / "run").exists()
+    assert load_config("riddle2022-planar", {"name": "Regenwurm \U0001fab1 \u5c3a\u8816 \u00a7"}).name
 
 
 def test_a_name_of_markup_is_shown_as_it_is(folder: Path, tmp_path: Path) -> None:
@@ -125,6 +123,10 @@ def test_a_name_of_markup_is_shown_as_it_is(folder: Path, tmp_path: Path) -> Non
     annelid("cite", folder)
     annelid("export", folder, "--to", "html", "-q", "-o", tmp_path / "page.html")
     require_plain_page((tmp_path / "page.html").read_text())
+    annelid(
+        "export", "riddle2023-rods", "--to", "mjcf", "--set", f"name={json.dumps(NAME)}", "-o", tmp_path / "worm.xml"
+    )
+    assert ET.parse(tmp_path / "worm.xml").getroot().get("model") == NAME
 
 
 def test_runs_in_folders_of_any_name_are_compared(folder: Path, tmp_path: Path) -> None:
@@ -153,11 +155,10 @@ def test_a_strangers_run_is_shown_and_exported_as_text(hostile: Run, tmp_path: P
     assert "\\u001b[2J" in page
 
 
-def test_an_error_names_what_is_wrong_as_text(subtests: pytest.Subtests) -> None:
-    for words in (["show", "{}"], ["{}"], ["run", "--{}"], ["run", "--set", "{}=1"], ["cite", "{}"]):
-        with subtests.test(f"{words!r:.60}"):
-            hostile = HOSTILE.replace("\x00", "")
-            assert annelid(*(word.format(hostile) if "{" in word else word for word in words), code=2)
+def test_an_error_names_what_is_wrong_as_text() -> None:
+    hostile = HOSTILE.replace("\x00", "")
+    for words in (["show", hostile], [hostile], ["run", f"--{hostile}"], ["run", "--set", f"{hostile}=1"]):
+        assert annelid(*words, code=2)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pseudo-terminals")
@@ -217,14 +218,10 @@ def test_tables_hold_no_formulas(tmp_path: Path) -> None:
     assert [row[0] for row in rows[1:]] == ["'=cmd|' /C calc'!A0", "'@SUM(1)", "'+1+1", "'-2+3", *kept]
 
 
-@pytest.mark.parametrize("suffix", [".svg", ".png"])
-def test_figures_show_names_as_they_are(suffix: str, tmp_path: Path) -> None:
+def test_figures_show_names_as_they_are(tmp_path: Path) -> None:
     with canvas(2.0) as figure:
-        axes = figure.subplots()
-        panel_title(axes, HOSTILE)
-        file = save(figure, tmp_path / f"figure{suffix}")
-    if suffix == ".svg":
-        ET.parse(file)
+        panel_title(figure.subplots(), HOSTILE)
+        ET.parse(save(figure, tmp_path / "figure.svg"))
 
 
 def test_a_sweep_over_names_is_drawn(tmp_path: Path) -> None:
@@ -244,13 +241,6 @@ def test_networks_are_drawn_with_any_names(tmp_path: Path) -> None:
     ET.fromstring(svg)
     ET.parse(network_figure(network, tmp_path / "network.svg"))
     assert all(CONTROL.search(text) is None for text in (svg, network.table()))
-
-
-def test_mjcf_of_any_name_is_xml(tmp_path: Path) -> None:
-    annelid(
-        "export", "--to", "mjcf", "riddle2023-rods", "--set", f"name={json.dumps(NAME)}", "-o", tmp_path / "worm.xml"
-    )
-    assert ET.parse(tmp_path / "worm.xml").getroot().get("model") == NAME
 
 
 def test_an_exported_view_shows_the_name_and_loads_nothing(tmp_path: Path) -> None:

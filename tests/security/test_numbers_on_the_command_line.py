@@ -29,7 +29,7 @@ WITH: dict[str, tuple[str, ...]] = {
     "check": (),
     "new": ("mine.toml",),
     "compare": ("RUN", "nothere.csv", "--map", "nothere.toml"),
-    "study limit-cycle": ("riddle2022-planar", "--time", "steps"),
+    "study limit-cycle": ("riddle2022-planar",),
     "export": ("RUN", "--to", "csv", "-o", "out"),
     "draw --time": ("RUN", "-o", "frame.png"),
     "draw": ("RUN", "--video", "video.mp4"),

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from annelid.draw.camera import FIELD_OF_VIEW_DEG, MARGIN, VIEWS_DEG, fitting_distance, view_angles
+from annelid.draw.camera import FIELD_OF_VIEW_DEG, VIEWS_DEG, fitting_distance, view_angles
 from annelid.errors import RunFileError
 
 points = st.lists(st.tuples(*[st.floats(-2.0, 2.0)] * 3), min_size=1, max_size=20)
@@ -28,12 +28,6 @@ def test_every_point_is_in_the_picture(offsets: list, view: str, aspect: float) 
     half = math.tan(math.radians(FIELD_OF_VIEW_DEG / 2))
     assert np.all(np.abs(relative @ above) <= half * depth + 1e-9)
     assert np.all(np.abs(relative @ across) <= aspect * half * depth + 1e-9)
-
-
-def test_a_ball_seen_from_the_side_needs_the_distance_of_its_silhouette() -> None:
-    # Top and bottom points of a vertical stick through the point looked at.
-    distance = fitting_distance([[0, 0, 1.0], [0, 0, -1.0]], 90.0, 0.0, 2.0)
-    assert distance == pytest.approx(1.0 / (MARGIN * math.tan(math.radians(15.0))))
 
 
 def test_an_unknown_view_is_refused_with_the_nearest() -> None:

@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 
 from annelid.draw import gallery
-from annelid.errors import RenderingUnavailable
 from annelid.simulation.runfile import Run
 
 
@@ -28,21 +27,3 @@ def test_a_picture_that_fails_does_not_cost_the_others(
     assert os.strerror(errno.ENOSPC) in said[0]
     assert f"annelid draw {tmp_path}" in said[0]
     assert [path.name for path in tmp_path.iterdir()] == ["frame.png"]
-
-
-def test_one_reason_is_said_once_for_all_its_pictures(
-    planar_run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def none(*_: object, **__: object) -> None:
-        raise RenderingUnavailable("no back-end")
-
-    monkeypatch.setattr(gallery, "render_frame", none)
-    monkeypatch.setattr(gallery, "render_video", none)
-    said: list[str] = []
-    drawn = gallery.draw_all(planar_run, tmp_path, video=True, quiet=True, complain=lambda what: said.append(str(what)))
-    assert next(drawn) == tmp_path / "figure7.png", "each path comes once it is drawn"
-    assert said == []
-    assert list(drawn) == []
-    assert len(said) == 1
-    assert "frame.png and video.mp4 not drawn: no back-end" in said[0]
-    assert f"--time 1.5 and annelid draw {tmp_path} --video {tmp_path / 'video.mp4'}" in said[0]

@@ -17,6 +17,10 @@ def test_mujoco_gl_is_obeyed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MUJOCO_GL", "off")
     with pytest.raises(RenderingUnavailable, match="MUJOCO_GL=off"):
         gl.candidates()
+    monkeypatch.setenv("MUJOCO_GL", "osmesa")
+    monkeypatch.setattr(gl, "works", lambda backend: False)
+    with pytest.raises(RenderingUnavailable, match=r"osmesa .* unset MUJOCO_GL"):
+        gl.find_backend()
 
 
 def test_without_a_back_end_the_sentence_names_the_install_line(
@@ -40,10 +44,3 @@ def test_doctor_finds_what_the_tests_themselves_run_on() -> None:
     for item in ("annelid", "python", "mujoco", "numpy", "xarray", "ffmpeg"):
         assert findings[item].ok, item
     assert all(finding.optional or finding.ok or finding.remedy for finding in findings.values())
-
-
-def test_a_chosen_back_end_that_fails_is_to_be_unset(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("MUJOCO_GL", "osmesa")
-    monkeypatch.setattr(gl, "works", lambda backend: False)
-    with pytest.raises(RenderingUnavailable, match=r"osmesa .* unset MUJOCO_GL"):
-        gl.find_backend()

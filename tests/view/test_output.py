@@ -29,17 +29,11 @@ def write_half(target: Path) -> None:
 
 
 def test_a_failure_keeps_the_old_file_and_leaves_no_draft(tmp_path: Path) -> None:
-    target = tmp_path / "a.txt"
-    target.write_text("before")
+    (target := tmp_path / "a.txt").write_text("before")
     with pytest.raises(RunFileError, match=r"cannot write .*a\.txt: No space left on device$"):
         write_half(target)
     assert target.read_text() == "before"
     assert list(tmp_path.iterdir()) == [target]
-
-
-def test_a_missing_folder_is_named(tmp_path: Path) -> None:
-    with pytest.raises(RunFileError, match=r"a\.txt: No such file"), whole_file(tmp_path / "none/a.txt") as draft:
-        draft.write_text("lost")
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes on Windows")
@@ -55,12 +49,8 @@ def test_a_pipe_is_written_and_not_replaced(tmp_path: Path) -> None:
 
 
 def test_a_link_stays_a_link(tmp_path: Path) -> None:
-    target, link = tmp_path / "a.txt", tmp_path / "link.txt"
+    (link := tmp_path / "link.txt").symlink_to(target := tmp_path / "a.txt")
     target.write_text("before")
-    try:
-        link.symlink_to(target)
-    except OSError:
-        pytest.skip("links are not allowed here")
     with whole_file(link) as draft:
         draft.write_text("after")
     assert link.is_symlink()

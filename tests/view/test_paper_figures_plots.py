@@ -110,46 +110,23 @@ def own_network() -> Network:
     return network
 
 
-def long_columns() -> Network:
-    """Five neurons a segment in two segments, with two connections back."""
-    network = Network("columns")
-    for segment in (1, 2):
-        for role in "abcde":
-            network.add_neuron(f"{role}_{segment}", Neuron())
-    for source, target in (("c_2", "a_1"), ("e_2", "d_1"), ("a_1", "c_1"), ("b_1", "b_2"), ("d_2", "d_2")):
-        network.add_synapse(source, target, Synapse(1.0, 100.0))
-    return network
+NETWORKS = (peristalsis_network(3), own_network(), robust_network(3))
 
 
-NETWORKS = {
-    "3 segments": peristalsis_network(3),
-    "own": own_network(),
-    "columns": long_columns(),
-    "robust": robust_network(3),
-}
-
-
-@pytest.fixture(params=NETWORKS.values(), ids=list(NETWORKS))
-def network(request: pytest.FixtureRequest) -> Network:
-    return request.param
-
-
-def test_every_part_of_a_network_is_drawn_exactly_once(network: Network, tmp_path: Path) -> None:
-    svg = ElementTree.parse(network_figure(network, tmp_path / "network.svg"))
-    ids = Counter(
-        node.get("id", "") for node in svg.iter() if node.get("id", "").startswith(("neuron-", "connection-"))
-    )
-    expected = [f"neuron-{i}" for i in range(len(network.neurons))]
-    assert ids == Counter([*expected, *(f"connection-{i}" for i in range(len(network.connections)))])
-
-
-def test_connections_run_from_source_to_target_and_avoid_other_neurons(network: Network) -> None:
-    places = place_neurons(network)
-    assert min(abs(one - other) for one, other in combinations(places.values(), 2)) >= 0.999
-    for link, route in zip(network.connections, route_connections(network, places), strict=True):
-        assert abs(route[[0, -1]] - [places[link.source], places[link.target]]) == pytest.approx(0.27, abs=0.03)
-        others = [place for name, place in places.items() if name not in (link.source, link.target)]
-        assert all(abs(route - place).min() > 0.28 for place in others)
+def test_every_part_of_a_network_is_drawn_exactly_once_and_connections_avoid_other_neurons(tmp_path: Path) -> None:
+    for network in NETWORKS:
+        svg = ElementTree.parse(network_figure(network, tmp_path / "network.svg"))
+        ids = Counter(
+            node.get("id", "") for node in svg.iter() if node.get("id", "").startswith(("neuron-", "connection-"))
+        )
+        expected = [f"neuron-{i}" for i in range(len(network.neurons))]
+        assert ids == Counter([*expected, *(f"connection-{i}" for i in range(len(network.connections)))])
+        places = place_neurons(network)
+        assert min(abs(one - other) for one, other in combinations(places.values(), 2)) >= 0.999
+        for link, route in zip(network.connections, route_connections(network, places), strict=True):
+            assert abs(route[[0, -1]] - [places[link.source], places[link.target]]) == pytest.approx(0.27, abs=0.03)
+            others = [place for name, place in places.items() if name not in (link.source, link.target)]
+            assert all(abs(route - place).min() > 0.28 for place in others)
 
 
 def test_segments_are_columns_from_left_to_right_and_other_neurons_stand_below() -> None:

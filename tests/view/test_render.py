@@ -2,7 +2,6 @@ from __future__ import annotations
 
 import math
 import sys
-import tempfile
 from pathlib import Path
 
 import imageio.v3
@@ -13,7 +12,7 @@ import pytest
 from annelid.body.worm import WormBody
 from annelid.config import load_config
 from annelid.draw.drawn_worm import DrawnWorm
-from annelid.draw.overlay import Overlay, bar_length, length_name
+from annelid.draw.overlay import Entry, Overlay, bar_length, length_name
 from annelid.draw.render import render_frame, render_video
 from annelid.draw.scene import WormScene
 from annelid.errors import MissingDependency, RunFileError
@@ -70,14 +69,6 @@ def test_worm_frame_fits_the_whole_worm_and_shows_its_contracted_ring(rods_run: 
 
 
 @needs_gl
-def test_worm_video_is_drawn_from_recorded_postures(rods_run: Run, tmp_path: Path) -> None:
-    target = render_video(rods_run, tmp_path / "video.mp4", fps=25, size=(160, 96))
-    frames = imageio.v3.imread(target)
-    assert frames.shape == (6, 96, 160, 3)
-    assert np.abs(frames[0].astype(int) - frames[-1]).max() > 30
-
-
-@needs_gl
 def test_waypoints_are_seen_where_they_count_as_reached(tmp_path: Path) -> None:
     course = {"kind": "course", "waypoints": [[-0.2, 0.0]], "reach_m": 0.2}
     config = load_config("riddle2023-rods", {"body.rings.layout": "halves", "turning": course, "duration_s": 0.04})
@@ -90,36 +81,30 @@ def test_waypoints_are_seen_where_they_count_as_reached(tmp_path: Path) -> None:
     assert rows.mean() == pytest.approx(60, abs=10)
 
 
-def test_impossible_frames_are_refused(subtests: pytest.Subtests, planar_run: Run, tmp_path: Path) -> None:
-    for time_s, name, camera, says in (
-        (9.0, "a.png", None, "recorded from 0 to 3 s"),
-        (float("nan"), "a.png", None, "recorded from 0 to 3 s"),
-        (1.0, "a.bmp2", None, r"\.png"),
-        (1.0, "a.png", "side", "one view"),
+def test_impossible_frames_are_refused(planar_run: Run, tmp_path: Path) -> None:
+    for time_s, name, camera, background, says in (
+        (9.0, "a.png", None, None, "recorded from 0 to 3 s"),
+        (math.nan, "a.png", None, None, "recorded from 0 to 3 s"),
+        (1.0, "a.bmp2", None, None, r"\.png"),
+        (1.0, "a.png", "side", None, "one view"),
+        (1.0, "a.png", None, "whit", r"unknown background 'whit'.*white"),
     ):
-        with subtests.test(f"{time_s!r:.60}"):
-            folder = Path(tempfile.mkdtemp(dir=tmp_path))
-            with pytest.raises(RunFileError, match=says):
-                render_frame(planar_run, time_s, folder / name, camera=camera)
-            assert list(folder.iterdir()) == []
+        with pytest.raises(RunFileError, match=says):
+            render_frame(planar_run, time_s, tmp_path / name, camera=camera, background=background)
+    assert list(tmp_path.iterdir()) == []
 
 
-def test_impossible_videos_are_refused(subtests: pytest.Subtests, planar_run: Run, tmp_path: Path) -> None:
+def test_impossible_videos_are_refused(planar_run: Run, tmp_path: Path) -> None:
     for fps, speed, says in (
-        (0.0, 1.0, "fps = 0: .* 1 to 240"),
-        (0.99, 1.0, "fps = 0.99"),
+        (0.99, 1.0, "fps = 0.99: .* 1 to 240"),
         (240.1, 1.0, "fps = 240.1"),
         (math.nan, 1.0, "fps = nan"),
-        (math.inf, 1.0, "fps = inf"),
         (25.0, 0.0, "speed = 0"),
-        (25.0, -1.0, "speed = -1"),
         (25.0, math.inf, "speed = inf"),
     ):
-        with subtests.test(f"{fps!r:.60}"):
-            folder = Path(tempfile.mkdtemp(dir=tmp_path))
-            with pytest.raises(RunFileError, match=says):
-                render_video(planar_run, folder / "a.mp4", fps=fps, speed=speed)
-            assert list(folder.iterdir()) == []
+        with pytest.raises(RunFileError, match=says):
+            render_video(planar_run, tmp_path / "a.mp4", fps=fps, speed=speed)
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(("fps", "suffix"), [(1.0, "mp4"), (240.0, "mkv")])
@@ -186,17 +171,15 @@ def test_a_failing_video_leaves_nothing_and_keeps_what_was_there(planar_run: Run
     assert [entry.name for entry in tmp_path.iterdir()] == ["a.mp4"]
 
 
-def test_the_scale_bar_is_as_long_as_it_says(subtests: pytest.Subtests) -> None:
+def test_the_scale_bar_is_as_long_as_it_says() -> None:
+    entries: list[Entry] = [("strand", (0.0, 0.0, 1.0), "line")]
     for width, pixels_per_m, name in ((960, 1000.0, "10 cm"), (960, 1100.0, "10 cm"), (1280, 100.0, "2 m")):
-        with subtests.test(f"{width!r:.60}"):
-            length_m = bar_length(width, pixels_per_m)
-            assert length_name(length_m) == name
-            overlay = Overlay(
-                (width, 500), [("strand", (0.0, 0.0, 1.0), "line")], pixels_per_m, "black", (1.0, 1.0, 1.0)
-            )
-            drawn = overlay.stamped(np.full((500, width, 3), 255, dtype=np.uint8), "")
-            dark = drawn[250:, width // 2 :].max(axis=2) < 60
-            assert dark.sum(axis=1).max() == pytest.approx(length_m * pixels_per_m, abs=2)
+        length_m = bar_length(width, pixels_per_m)
+        assert length_name(length_m) == name
+        overlay = Overlay((width, 500), entries, pixels_per_m, "black", (1.0, 1.0, 1.0))
+        drawn = overlay.stamped(np.full((500, width, 3), 255, dtype=np.uint8), "")
+        dark = drawn[250:, width // 2 :].max(axis=2) < 60
+        assert dark.sum(axis=1).max() == pytest.approx(length_m * pixels_per_m, abs=2)
 
 
 @needs_gl
@@ -227,25 +210,19 @@ def test_a_background_is_of_one_colour_below_a_worm_with_a_shadow(rods_run: Run,
     assert np.mean(grey & (pixels.max(axis=2) < near.max() - 8)) > 0.01, "no shadow"
 
 
-def test_an_unknown_background_is_refused(planar_run: Run, picture: Path) -> None:
-    with pytest.raises(RunFileError, match=r"unknown background 'whit'.*white"):
-        render_frame(planar_run, 1.0, picture, background="whit")
-
-
 def test_a_planar_worm_can_be_drawn_on_a_dark_page(planar_run: Run, picture: Path) -> None:
     render_frame(planar_run, 1.0, picture, size=(320, 160), background="dark")
     assert imageio.v3.imread(picture)[0, 0, :3].max() < 60
 
 
 @needs_gl
-def test_soft_crossings_have_a_bar_to_each_strand(subtests: pytest.Subtests) -> None:
+def test_soft_crossings_have_a_bar_to_each_strand() -> None:
     for preset, n_links in (("riddle2023-rods", 0), ("riddle2023", 2), ("riddle2023-fast", 2)):
-        with subtests.test(f"{preset!r:.60}"):
-            config = load_config(preset)
-            assert isinstance(config.body, WormBody)
-            worm = DrawnWorm(config)
-            worm.pose(worm.model.qpos0)
-            scene = mujoco.MjvScene(worm.model, maxgeom=1000)
-            worm.add_links(scene)
-            assert scene.ngeom == n_links * config.body.geometry().n_crossings
-            assert ("soft" in worm.legend()[-1][0]) == (n_links > 0)
+        config = load_config(preset)
+        assert isinstance(config.body, WormBody)
+        worm = DrawnWorm(config)
+        worm.pose(worm.model.qpos0)
+        scene = mujoco.MjvScene(worm.model, maxgeom=1000)
+        worm.add_links(scene)
+        assert scene.ngeom == n_links * config.body.geometry().n_crossings
+        assert ("soft" in worm.legend()[-1][0]) == (n_links > 0)

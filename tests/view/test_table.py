@@ -25,17 +25,14 @@ def printed(run: Run, numbers: Summary, width: int) -> list[str]:
     return text.getvalue().splitlines()
 
 
-def test_our_numbers_stay_in_a_narrow_terminal(subtests: pytest.Subtests, planar_run: Run) -> None:
-    for width in (40, 50, 60, 100):
-        with subtests.test(f"{width!r:.60}"):
-            numbers = replace(
-                summary(planar_run), period_s=2.125, period_std_s=None, order=[1, 2, 3], onsets_s=[0.0, 0.5, 1.0]
-            )
-            lines = printed(planar_run, numbers, width)
-            assert any("this run" in line for line in lines)
-            assert any("2.125 s" in line for line in lines)
-            assert "3 at 1.00" in " ".join(" ".join(lines).split())
-            assert max(len(line) for line in lines) <= width
+def test_our_numbers_stay_in_a_narrow_terminal(planar_run: Run) -> None:
+    numbers = replace(summary(planar_run), period_s=2.125, period_std_s=None, order=[1, 2, 3], onsets_s=[0.0, 0.5, 1.0])
+    for width in (40, 60, 100):
+        lines = printed(planar_run, numbers, width)
+        assert any("this run" in line for line in lines)
+        assert any("2.125 s" in line for line in lines)
+        assert "3 at 1.00" in " ".join(" ".join(lines).split())
+        assert max(len(line) for line in lines) <= width
 
 
 def test_no_number_is_minus_zero(rods_run: Run) -> None:
@@ -87,12 +84,11 @@ def test_a_reproduction_is_claimed_if_and_only_if_order_period_and_each_elongati
         assert (f"elongation of segment {segment} " in sentence) == (one > 0.05)
 
 
-def test_a_changed_worm_reproduces_nothing(subtests: pytest.Subtests) -> None:
+def test_a_changed_worm_reproduces_nothing() -> None:
     for changes in ({"arena.friction": 0.3}, {"controller.gate_time_constant_ms": 200.0}, {"duration_s": 6.0}):
-        with subtests.test(f"{changes!r:.60}"):
-            sentence = closing_sentence(formulation(), load_config("riddle2023-fast", changes))
-            assert "reproduce" not in sentence
-            assert next(iter(changes)) in sentence
+        sentence = closing_sentence(formulation(), load_config("riddle2023-fast", changes))
+        assert "reproduce" not in sentence
+        assert next(iter(changes)) in sentence
 
 
 def test_a_worm_of_another_name_is_compared_with_the_nearest_preset(tmp_path: Path) -> None:
@@ -131,10 +127,3 @@ def test_rigid_crossings_are_explained_in_the_table_that_compares_them() -> None
     twice = replace(paper, elongation_mean_max_m=[2.1 * (one or 0.0) for one in paper.elongation_mean_max_m])
     assert "crossings are rigid, and a segment elongates 2.1 times as far" in legend(twice, RODS)
     assert "rigid" not in legend(twice, FAST)
-    assert "soft crossings" in " ".join(printed_of(twice))
-
-
-def printed_of(numbers: Summary) -> list[str]:
-    text = StringIO()
-    Console(file=text, width=200).print(summary_table(numbers, RODS))
-    return text.getvalue().splitlines()

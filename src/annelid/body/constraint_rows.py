@@ -29,6 +29,8 @@ INERTANCE = 1e-3
 """Of a row, as a share of its damping times the step, and of its stiffness times the square: nothing to be seen."""
 IMPEDANCE = 0.01
 _ROW, _TIE = "row_", "row_tie_"
+LEAST_INERTIA_KG_M2 = 2e-15
+"""Twice the least that the engine takes."""
 
 
 def add_held_coordinate(spec: mujoco.MjSpec) -> None:
@@ -40,13 +42,17 @@ def add_held_coordinate(spec: mujoco.MjSpec) -> None:
 
 
 def add_holder(spec: mujoco.MjSpec, name: str, mass_kg: float, inertia_kg_m2: float) -> mujoco.MjsBody:
-    """Adds a body of the world, a point mass with the same small inertia about every axis."""
+    """Adds a body of the world, a point mass with the same small inertia about every axis.
+
+    The engine refuses less than `LEAST_INERTIA_KG_M2`. More than its own changes nothing for a point on slides, which
+    never turns, and little for the twist of an edge (`annelid.body.formulations.rods.net.MOST_RAISED`).
+    """
     return spec.worldbody.add_body(
         name=name,
         mass=mass_kg,
         ipos=[0.0, 0.0, 0.0],
         iquat=[1.0, 0.0, 0.0, 0.0],
-        inertia=[inertia_kg_m2] * 3,
+        inertia=[max(inertia_kg_m2, LEAST_INERTIA_KG_M2)] * 3,
         explicitinertial=True,
     )
 

@@ -5,6 +5,7 @@ These belong together: a run is made of kinds, and a kind is checked against its
 
 from __future__ import annotations
 
+import warnings
 from abc import abstractmethod
 from collections.abc import Iterator, Mapping
 from functools import cache
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     from annelid.arena.course import Bore, Course
     from annelid.arena.surface import Shape, Surface
     from annelid.morphology import MeshGeometry
-    from annelid.protocols import Array, Controller, Plant, Steering, Values
+    from annelid.protocols import Array, Controller, Plant, Sensation, Values
 
 MOST_SAMPLES = 10_000_000
 
@@ -78,8 +79,13 @@ class ControllerKind(Kind):
 
 
 class TurningKind(Kind):
-    """Base of the sections that scale the two sides of a worm with half-rings."""
+    """Base of the sections that scale the two sides of a worm with half-rings, by a rule with a state of its own.
 
+    Attributes:
+        senses: What the rule senses, names in `annelid.control.SENSED`.
+    """
+
+    senses: ClassVar[tuple[str, ...]] = ()
     registry: ClassVar[Registry[type[Any]]] = Registry("turning.kind", "annelid.control.turning")
     default: ClassVar[str] = "constant"
 
@@ -97,13 +103,20 @@ class TurningKind(Kind):
         return Goals()
 
     @abstractmethod
-    def build(self, n_segments: int, control_timestep_s: float) -> Steering:
-        """Builds the steering in its initial state.
+    def at_start(self) -> dict[str, Any]:
+        """Returns the state with which both sides are whole."""
 
-        Args:
-            n_segments: Segments of the worm.
-            control_timestep_s: Control step, s.
+    @abstractmethod
+    def advance(self, now: dict[str, Any], sensation: Sensation, timestep_s: float) -> None:
+        """Takes one control step, in place.
+
+        Raises:
+            ConfigError: The body cannot sense what the rule needs.
         """
+
+    @abstractmethod
+    def scales(self, now: dict[str, Any], n_segments: int) -> Array:
+        """Returns what is left of the activation of each half, in [0, 1], ``(n_segments, 2)``: left and right half."""
 
 
 class BodyKind(Kind):
@@ -116,7 +129,6 @@ class BodyKind(Kind):
         needs_arena: Whether it stands on an arena, the default one where none is given.
         is_planar: Whether it moves in one plane, and is drawn from its side.
         has_skin: Whether the sides of its segments feel touch.
-        touches_ground: Whether anything of the body bears on a ground or a wall.
         can_be_pushed: Whether a trial may push it.
         is_papers: Whether it is in the paper's own formulation, which others are compared with.
         has_rigid_crossings: Whether the two strands of a crossing share a point.
@@ -131,7 +143,6 @@ class BodyKind(Kind):
     needs_arena: ClassVar[bool] = False
     is_planar: ClassVar[bool] = False
     has_skin: ClassVar[bool] = False
-    touches_ground: ClassVar[bool] = True
     can_be_pushed: ClassVar[bool] = False
     segments_field: ClassVar[str] = "body.n_segments"
     frame_size: ClassVar[tuple[int, int]] = (1280, 800)
@@ -414,10 +425,14 @@ class RunConfig(Section):
     @model_validator(mode="after")
     def _intervals_divide_the_run(self) -> Self:
         step = self.clock.control_timestep_s
+        if not is_multiple(self.duration_s, step):
+            whole = float(f"{max(round(self.duration_s / step), 1) * step:.9g}")
+            was = f"duration_s = {self.duration_s:g}"
+            warnings.warn(f"{was} is taken as {whole:g}, a whole number of control steps", stacklevel=2)
+            self.__dict__["duration_s"] = whole  # The section is frozen.
         for field, value in (
             ("record.signals_interval_s", self.record.signals_interval_s),
             ("record.frames_interval_s", self.record.frames_interval_s),
-            ("duration_s", self.duration_s),
         ):
             if not is_multiple(value, step):
                 raise ValueError(

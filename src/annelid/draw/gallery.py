@@ -20,7 +20,7 @@ VIDEO_TASK = "drawing the video"
 def draw_all(run: Run, folder: Path, *, video: bool, quiet: bool, complain: Callable[[object], None]) -> Iterator[Path]:
     """Draws ``figure7.png``, ``frame.png`` and ``video.mp4``, and yields the path of each once it is written.
 
-    At the end ``complain`` is called with one sentence for each reason for which pictures could not be drawn.
+    ``complain`` is called with a sentence for each that could not be drawn.
     """
     frame_time = frame_time_s(run)
     frame_remedy = f"annelid draw {folder} --time {frame_time:g}"
@@ -36,18 +36,13 @@ def draw_all(run: Run, folder: Path, *, video: bool, quiet: bool, complain: Call
     ]
     if video:
         pictures.append((video_path.name, draw_video, f"annelid draw {folder} --video {video_path}"))
-    failures: dict[str, list[tuple[str, str]]] = {}
     for name, draw, remedy in pictures:
         try:
             path = draw(folder / name)
         except (AnnelidError, OSError) as error:
-            failures.setdefault(str(error), []).append((name, remedy))
+            complain(f"{name} not drawn: {error} (the run is whole; then draw with: {remedy})")
         else:
             yield path
-    for reason, failed in failures.items():
-        names = " and ".join(name for name, _ in failed)
-        remedies = " and ".join(remedy for _, remedy in failed)
-        complain(f"{names} not drawn: {reason} (the run is whole; then draw with: {remedies})")
 
 
 def frame_time_s(run: Run) -> float:

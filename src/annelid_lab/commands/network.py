@@ -108,7 +108,4 @@ def export_network_command(
         firmware = network_firmware(network, step_ms, cast(Scheme, scheme or "euler"), real=real)
     else:
         firmware = controller_firmware(worm, name, real=real)
-    for written in firmware.paths(target, wire=wire):
-        if written.exists():
-            refuse_existing(written, force)
     print_paths(firmware.write(target, overwrite=force, wire=wire))

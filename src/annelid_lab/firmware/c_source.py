@@ -3,29 +3,24 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib.metadata import version
-from importlib.resources import files
 from itertools import chain
-from pathlib import Path
-from string import Template
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from annelid.control import SENSED, CircuitController
-from annelid.errors import ConfigError, RunFileError
+from annelid.errors import ConfigError
 from annelid.nervous import NO_GATE, Network, NetworkState, Scheme, Stepper
-from annelid.output import write_text
 from annelid.text import numbered
+from annelid_lab.firmware.files import Firmware, Real, comment, filled, identifier
 
-Real = Literal["double", "float"]
 LONGEST_NAME = 24
 """Characters of the name with which everything global begins; C99 promises 31 of a whole one."""
-LONGEST_LABEL = 40
 N_BLOCKS, STEPS = 16, 300
 """Of the self-test: blocks under one sensation each, and steps of a block."""
 MOST_LATE = 4
@@ -37,65 +32,6 @@ _SCHEMES: dict[Scheme, str] = {
     "heun": "Heun's method",
 }
 _INTERFACE = re.compile(r"\b(EXP|POW)\(")
-_UNSAFE = re.compile(r"[^A-Za-z0-9 _.,:;()+=-]")
-
-
-@dataclass(frozen=True)
-class Firmware:
-    """C99 of a network or a controller, and what a program on this machine needs to know of it.
-
-    Attributes:
-        name: What its files are called and everything global in them begins with.
-        header: Text of ``name.h``.
-        source: Text of ``name.c``.
-        self_test: Text of ``name_selftest.c``.
-        real: Type of all numbers.
-        sensors: Names and shapes of what a step is given, in the order in the struct, which has nothing else.
-        returned: Name and length of what it returns.
-        neurons: Names of the neurons, in the order in ``potential_mV``, with which the struct of the state begins.
-        wire: Of a controller: texts of ``name_wire.h`` and ``name_wire.c``, which answer annelid over a line.
-    """
-
-    name: str
-    header: str
-    source: str
-    self_test: str
-    real: Real
-    sensors: Mapping[str, tuple[int, ...]]
-    returned: tuple[str, int]
-    neurons: tuple[str, ...]
-    wire: tuple[str, ...] = ()
-
-    def paths(self, folder: Path, *, wire: bool = False) -> list[Path]:
-        """Returns where `write` writes."""
-        endings = (".h", ".c", "_selftest.c", *(("_wire.h", "_wire.c") if wire else ()))
-        return [folder / f"{self.name}{ending}" for ending in endings]
-
-    def write(self, folder: str | Path, *, overwrite: bool = False, wire: bool = False) -> list[Path]:
-        """Writes the three files, and those of the wire if asked for, into a folder, which is made if it is not there.
-
-        Returns:
-            Their paths.
-
-        Raises:
-            ConfigError: The wire of what has none is asked for.
-            RunFileError: A file exists, unless it may be overwritten, or cannot be written.
-        """
-        if wire and not self.wire:
-            raise ConfigError(
-                "only a whole controller answers over the wire, not a network alone, and none of more than 256 numbers"
-            )
-        folder = Path(folder)
-        paths = self.paths(folder, wire=wire)
-        for path in paths:
-            if path.exists() and not overwrite:
-                raise RunFileError(f"{path} exists: name another folder, or allow to overwrite it")
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise RunFileError(f"cannot make the folder {folder}: {error.strerror}") from None
-        texts = (self.header, self.source, self.self_test, *(self.wire if wire else ()))
-        return [write_text(path, text) for path, text in zip(paths, texts, strict=True)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,16 +47,6 @@ class Vectors:
         self.sensed.append(sensed)
         for kept, values in ((self.potential, potential), (self.returned, returned)):
             kept.append(np.array(values)[-MOST_LATE - 1 :])
-
-
-def identifier(text: str, longest: int = LONGEST_LABEL) -> str:
-    """Returns the letters, digits and underscores of a text, with an underscore for every other character."""
-    return re.sub(r"[^A-Za-z0-9_]", "_", text)[:longest] or "_"
-
-
-def comment(text: str) -> str:
-    """Returns a text as it may stand in a comment: no character that could end it, or that a compiler replaces."""
-    return _UNSAFE.sub("_", text)[: LONGEST_LABEL * 2]
 
 
 class Writer:
@@ -455,17 +381,3 @@ def _of_neuron(network: Network, name: str) -> str:
     if neuron.channels:
         kinds.append(f"{len(neuron.channels)} gated channel{'s' if len(neuron.channels) > 1 else ''}")
     return ", ".join(kinds)
-
-
-def filled(template: str, words: Mapping[str, Any]) -> str:
-    """Fills a template: lines between ``@if word`` and ``@end`` stay where the word is true, ``$word`` is replaced."""
-    lines: list[str] = []
-    stays: list[bool] = []
-    for line in files("annelid_lab.firmware").joinpath(template).read_text(encoding="utf-8").splitlines():
-        if line.startswith("@if "):
-            stays.append(bool(words[line.removeprefix("@if ")]))
-        elif line == "@end":
-            stays.pop()
-        elif all(stays):
-            lines.append(Template(line).substitute(words))
-    return re.sub(r"\n{3,}", "\n\n", "\n".join(lines)) + "\n"

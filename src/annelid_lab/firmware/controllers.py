@@ -11,7 +11,8 @@ from annelid.control import SENSED, CircuitController, TurningController
 from annelid.errors import ConfigError, shown
 from annelid.nervous import Network, Scheme
 from annelid.protocols import Controller, Sensation
-from annelid_lab.firmware.c_source import N_BLOCKS, STEPS, Firmware, Real, Vectors, Writer, filled
+from annelid_lab.firmware.c_source import N_BLOCKS, STEPS, Vectors, Writer
+from annelid_lab.firmware.files import Firmware, Real, filled
 from annelid_lab.loop.frames import MOST_STEPS, VERSION, Interface, most_stuffed
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from annelid.control import SENSED
 from annelid.errors import MissingDependency
 from annelid.protocols import Array, Sensation
-from annelid_lab.firmware.c_source import Firmware
+from annelid_lab.firmware.files import Firmware
 
 OPTIONS = "-std=c99 -Wall -Wextra -Werror -pedantic -O2 -ffp-contract=off -shared -fPIC"
 

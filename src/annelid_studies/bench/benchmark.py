@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from annelid.errors import AnnelidError, RunFileError
+from annelid.errors import AnnelidError
 from annelid.experiment import Processes, StudyProgress, case_key, code_fingerprint
 from annelid.output import write_json, write_text
 from annelid.simulation import locks
@@ -34,9 +34,6 @@ QUANTITIES = ("elongation", "period", "travel", "work", "slip")
 
 SCALED_SEGMENTS = (12, 30)
 """Beside the whole range of segments, the exponent of the cost is taken over this one."""
-
-SLOWDOWN = 0.1
-"""By which a case may be slower than before, against the yardstick."""
 
 MEASURING = "annelid_studies.bench.measure"
 """The code that a measurement depends on beside the physics."""
@@ -199,39 +196,6 @@ def _quantities(summary: Mapping[str, Any]) -> dict[str, list[float | None]]:
         "work": [None if None in works else float(np.sum(works))],
         "slip": [path / abs(travel) if path is not None and travel else None],
     }
-
-
-def in_yardsticks(content: Any) -> dict[str, float]:
-    """Returns what a quiet step of each case takes, over what its yardstick took at that time, by the case's name.
-
-    Args:
-        content: Of a ``bench.json``; cases that have neither are left out.
-
-    Raises:
-        RunFileError: It is none, or has no such case.
-    """
-    cases = content.get("cases") if isinstance(content, dict) else None
-    if not isinstance(cases, list) or not all(isinstance(case, dict) and "name" in case for case in cases):
-        raise RunFileError("a benchmark to compare with must be a bench.json, with a list of cases that have names")
-    found: dict[str, float] = {}
-    for case in cases:
-        step, yardstick = case.get("step_quiet_ms"), case.get("yardstick_ms")
-        if isinstance(step, int | float) and isinstance(yardstick, int | float) and step > 0 and yardstick > 0:
-            found[str(case["name"])] = step / yardstick
-    if not found:
-        raise RunFileError("a benchmark to compare with has no case whose yardstick was taken: measure it again")
-    return found
-
-
-def slowdowns(now: Mapping[str, float], before: Mapping[str, float]) -> dict[str, float]:
-    """Returns by which share each case of both takes longer now, both `in_yardsticks`; negative if it is faster.
-
-    Raises:
-        RunFileError: They have no case in common.
-    """
-    if not (common := [name for name in now if name in before]):
-        raise RunFileError(f"the benchmarks have no case in common: {len(now)} cases now, {len(before)} before")
-    return {name: now[name] / before[name] - 1.0 for name in common}
 
 
 def exponent(sizes: Sequence[float], costs: Sequence[float]) -> float | None:

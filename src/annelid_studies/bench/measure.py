@@ -49,14 +49,13 @@ def measure(config: RunConfig, perturbed: Sequence[RunConfig] = ()) -> dict[str,
     from annelid.analysis import rhythm_score, summary
     from annelid.body import build_spec, compile_spec
     from annelid.simulation import WormPlant, build_controller, open_run, simulate, start
-    from annelid_studies.bench.timing import QUIET, Stopwatch, engine_times, laps_s, shares, yardstick_ms
+    from annelid_studies.bench.timing import Stopwatch, engine_times, laps_s, shares
 
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else None
     plant = WormPlant(config)
     controller = build_controller(config, plant)
     stepping = Stopwatch(plant, "step", "stride", reading=lambda: plant.data.time)
     watching, controlling = Stopwatch(plant, "alarm"), Stopwatch(controller, "step", "stride")
-    before_ms = yardstick_ms()
 
     def finished(number: int, config: RunConfig, folder: str, **parts: Any) -> Run:
         path = Path(folder) / str(number)
@@ -71,7 +70,6 @@ def measure(config: RunConfig, perturbed: Sequence[RunConfig] = ()) -> dict[str,
     with tempfile.TemporaryDirectory() as folder:
         run = finished(0, config, folder, plant=plant, controller=controller)
         peak = peak_memory_bytes()
-        after_ms = yardstick_ms()
         numbers, rhythm = summary(run), rhythm_score(run)
         others = [summary(finished(number, one, folder)) for number, one in enumerate(perturbed, 1)]
     total_s = run.wall_time_s
@@ -95,8 +93,6 @@ def measure(config: RunConfig, perturbed: Sequence[RunConfig] = ()) -> dict[str,
         "simulated_s": simulated_s,
         "step_median_ms": float(np.median(laps_ms)) if laps_ms.size else None,
         "step_mean_ms": float(np.mean(laps_ms)) if laps_ms.size else None,
-        "step_quiet_ms": float(np.percentile(laps_ms, QUIET)) if laps_ms.size else None,
-        "yardstick_ms": 0.5 * (before_ms + after_ms),
         "shares": shares(total_s, plant_s, control_s, engine),
         "peak_memory_MB": None if peak is None else peak / _MB,
         "build_s": built - began,

@@ -1,4 +1,4 @@
-"""The benchmark as a table, and in one picture: error against speed, processor time, cost against length, shares."""
+"""The benchmark as a table, and in one picture: error against speed, cost against length."""
 
 from __future__ import annotations
 
@@ -27,8 +27,6 @@ _WAYS = ("o-", "s", "D", "^", "x")
 _LEAST_PERCENT = 0.02
 _LABELS = {CHAIN: "paper's chain", RODS: "rods"}
 _FADED = "0.35"
-# Cold within the engine, warm around it.
-_SHARE_COLORS = ("#1b2a6b", "#3658a7", "#5f8fd0", "#35b5a0", "#8fd3c5", "#c5cdd6", "#e3b428", "#c2410c", "#7a2a0a")
 
 
 def bench_table(report: Mapping[str, Any]) -> TerminalTable:
@@ -37,16 +35,6 @@ def bench_table(report: Mapping[str, Any]) -> TerminalTable:
     caption = "error: of elongation or period against the converged run, the larger, over runs of perturbed friction"
     table = Table(header, [_row(entry) for entry in report["cases"]])
     return terminal_table(table, f"{report['machine']}, recording on", caption=caption)
-
-
-def slowdown_table(slowdowns: Mapping[str, float], tolerated: float) -> TerminalTable:
-    """Lays out what `annelid_studies.bench.benchmark.slowdowns` found, the slowest first."""
-    rows = [
-        [name, f"{100 * share:+.0f} %", "slower" if share > tolerated else ""]
-        for name, share in sorted(slowdowns.items(), key=lambda item: -item[1])
-    ]
-    caption = f"against the yardstick; {100 * tolerated:.0f} % are tolerated"
-    return terminal_table(Table(["case", "time of a step", ""], rows), "Against the earlier benchmark", caption=caption)
 
 
 def _row(entry: Mapping[str, Any]) -> list[str]:
@@ -76,24 +64,16 @@ def bench_figure(report: Mapping[str, Any], stem: Path) -> Path:
 
     Above: errors against the converged run over times real time, one panel for each quantity, with bars over the
     perturbed runs: a line through the steps, marks of the levels of fidelity, and crosses where the rhythm is not
-    ordered. Below: by how much less processor time levels and presets take than the paper's formulation, the time of a
-    step against the number of segments with the slope, and its shares by phase. Panels for which nothing was measured
-    stay out.
+    ordered. Below: the time of a step against the number of segments with the slope. What was not measured stays out.
     """
     measured = [entry for entry in report["cases"] if "failed" not in entry]
     judged = [entry for entry in measured if "elongation" in entry.get("errors", {})]
-    compared = {_label(entry): less for entry in measured if (less := entry.get("times_less_cpu"))}
     scaled = [entry for entry in measured if {"segments", "chain"} & set(entry["lines"])]
-    divided = _divided(measured)
     panels: list[tuple[float, Callable[[SubFigure], None]]] = []
     if judged:
         panels.append((5.4, lambda part: _errors(part, judged)))
-    if compared:
-        panels.append((0.8 + 0.24 * len(compared), lambda part: _compared(part, compared)))
     if scaled:
         panels.append((2.7, lambda part: _cost(part, scaled, report["cost_exponents"])))
-    if divided:
-        panels.append((1.2 + 0.24 * len(divided), lambda part: _shares(part, divided)))
     heights = [height for height, _ in panels]
     with canvas(sum(heights) or 1.0) as figure:
         if panels:
@@ -101,12 +81,6 @@ def bench_figure(report: Mapping[str, Any], stem: Path) -> Path:
             for part, (_, draw) in zip(rows, panels, strict=True):
                 draw(part)
         return save_both(figure, stem)
-
-
-def _label(entry: Mapping[str, Any]) -> str:
-    """A level of fidelity with its resolution, or a preset."""
-    step = f"{entry['physics_step_ms']:g} ms"
-    return f"{entry['level']}: {entry['elements_per_side']} elements, {step}" if entry["level"] else entry["preset"]
 
 
 def _errors(part: SubFigure, judged: Sequence[Any]) -> None:
@@ -161,17 +135,6 @@ def _error_axes(axes: Axes, quantity: str) -> None:
     panel_title(axes, quantity.capitalize())
 
 
-def _compared(part: SubFigure, times_less: Mapping[str, float]) -> None:
-    axes = part.subplots()
-    bars = axes.barh(list(times_less), list(times_less.values()), 0.72, color=_SHARE_COLORS[1])
-    axes.bar_label(bars, [f"{less:.3g}" for less in times_less.values()], padding=3, fontsize=8)
-    axes.invert_yaxis()
-    axes.grid(axis="y", visible=False)
-    axes.tick_params(axis="y", length=0)
-    axes.margins(x=0.08)
-    panel_title(axes, f"Times less processor time than {CHAIN}, for a simulated second")
-
-
 def _cost(part: SubFigure, entries: Sequence[Any], exponents: Mapping[str, Mapping[str, float]]) -> None:
     axes = part.subplots()
     lines: dict[str, dict[int, Any]] = {}
@@ -196,35 +159,3 @@ def _cost(part: SubFigure, entries: Sequence[Any], exponents: Mapping[str, Mappi
     axes.set_ylabel("time of a step (ms)")
     part.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=1)
     panel_title(axes, "Cost of a step against the length of the worm")
-
-
-def _divided(measured: Sequence[Any]) -> dict[str, Any]:
-    """The cases whose shares are drawn: levels of fidelity and presets, and the longest worm of each line."""
-    found = {_label(entry): entry for entry in measured if "levels" in entry["lines"]}
-    for line in ("segments", "chain"):
-        if on_line := [entry for entry in measured if line in entry["lines"]]:
-            longest = max(on_line, key=lambda entry: entry["n_segments"])
-            found[f"{_LABELS[longest['preset']]}, N = {longest['n_segments']}"] = longest
-    return found
-
-
-def _shares(part: SubFigure, entries: Mapping[str, Any]) -> None:
-    axes = part.subplots()
-    phases = list(next(iter(entries.values()))["shares"])
-    places = np.arange(len(entries))
-    left = np.zeros(len(entries))
-    for phase, color in zip(phases, _SHARE_COLORS, strict=False):
-        widths = np.array([100.0 * max(entry["shares"][phase], 0.0) for entry in entries.values()])
-        axes.barh(places, widths, 0.72, left=left, color=color, label=phase, edgecolor="w", linewidth=0.4)
-        left += widths
-    for place, entry in zip(places, entries.values(), strict=True):
-        end = 101.0, float(place)
-        axes.annotate(f"{entry['step_mean_ms']:.3g} ms", end, va="center", fontsize=8, annotation_clip=False)
-    axes.set_yticks(places, list(entries))
-    axes.invert_yaxis()
-    axes.set_xlim(0.0, 100.0)
-    axes.grid(axis="y", visible=False)
-    axes.tick_params(axis="y", length=0)
-    axes.set_xlabel("share of a step of the closed loop (%)")
-    panel_title(axes, "Where the time of a step goes")
-    part.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=5, columnspacing=1.2)

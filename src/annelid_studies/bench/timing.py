@@ -20,37 +20,6 @@ PHASES = (*ENGINE_PHASES, "engine, rest", "plant", "network and control", "recor
 """All parts of a step of the closed loop, from the engine outwards."""
 
 
-QUIET = 10.0
-"""Percentile of times that other programs hardly disturb, %."""
-YARDSTICK = """
-<mujoco>
-  <option integrator="implicitfast"/>
-  <worldbody>
-    <body><freejoint/><geom size=".1" mass="1"/>
-      <replicate count="40" euler="0 0 9"><body pos=".2 0 0"><joint axis="0 1 0" damping=".1"/><geom size=".05"/>
-        <body pos=".2 0 0"><joint axis="0 0 1" damping=".1"/><geom size=".05"/></body></body></replicate>
-    </body>
-    <geom type="plane" size="1 1 1" pos="0 0 -.06"/>
-  </worldbody>
-</mujoco>
-"""
-"""A body of the engine's own with contacts, none of it annelid's: how fast a machine is at the moment."""
-
-
-def yardstick_ms(seconds: float = 0.5) -> float:
-    """Times steps of `YARDSTICK` for so long, and returns the `QUIET` percentile, ms."""
-    model = mujoco.MjModel.from_xml_string(YARDSTICK)
-    data, taken = mujoco.MjData(model), array("d")
-    ends = perf_counter() + seconds
-    while (began := perf_counter()) < ends or not taken:
-        if len(taken) % 200 == 0:
-            mujoco.mj_resetData(model, data)
-            began = perf_counter()
-        mujoco.mj_step(model, data)
-        taken.append(1e3 * (perf_counter() - began))
-    return float(np.percentile(taken, QUIET))
-
-
 class Stopwatch:
     """Times the calls of some methods of one object; one that another of them calls is not counted twice."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, cast, get_args
+from typing import Annotated
 
 import typer
 
@@ -32,10 +32,6 @@ def limit_cycle_command(
     threshold: Annotated[
         float | None, typer.Option(help="Threshold, mV above rest.  [default: half the operating range]")
     ] = None,
-    times: Annotated[
-        list[str] | None,
-        typer.Option("--time", metavar="WAY", help="continuous or steps; may be repeated.  [default: both]"),
-    ] = None,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Picture to write: .png, .pdf, .svg  [default: none]")
     ] = None,
@@ -47,31 +43,29 @@ def limit_cycle_command(
     cycle. Prints the period and the Floquet multipliers: what one cycle leaves of a deviation. All but one
     below 1 in magnitude: the rhythm comes back by itself; the one at 1 is a shift in time, which stays.
 
-    Time is taken in two ways: continuous, for the multipliers, and in the worm's own steps, each ended where a
-    stretch sensor switches, for the period of a run. The picture shows the phase response too: by how much a
-    kick of a neuron, at each phase, advances the rhythm. It takes about ten seconds for 3 segments, twenty
-    for 6. The body is riddle2022 and the controller sns; default preset: riddle2022-planar.
+    Time is continuous: the worm's equations are integrated between the switches of its sensors and synapses.
+    The picture shows the phase response too: by how much a kick of a neuron, at each phase, advances the rhythm.
+    It takes about ten seconds for 3 segments, twenty for 6. The body is riddle2022 and the controller sns;
+    default preset: riddle2022-planar.
 
     \b
     annelid study limit-cycle riddle2022-planar --segments 6
-    annelid study limit-cycle riddle2022-planar --time continuous -o cycle.png
+    annelid study limit-cycle riddle2022-planar -o cycle.png
     annelid study limit-cycle --set controller.gate_time_constant_ms=200 --set body.gain=1.9
-    annelid study limit-cycle --json | jq .continuous.multipliers[0]
+    annelid study limit-cycle --json | jq .multipliers[0]
     """
     from annelid.draw import plot_path
     from annelid.terminal import Console
-    from annelid_studies.limit_cycle.cycle import Time, limit_cycle
+    from annelid_studies.limit_cycle.cycle import limit_cycle
     from annelid_studies.limit_cycle.figure import limit_cycle_figure
-    from annelid_studies.limit_cycle.report import TIMES, cycle_numbers, cycle_table
+    from annelid_studies.limit_cycle.report import cycle_numbers, cycle_table
 
     if output is not None:
         output = plot_path(output)
         refuse_existing(output, force)
     config = config_of("riddle2022-planar" if preset is None else preset, overrides_of(assignments), segments)
-    wanted = cast(list["Time"], times or list(get_args(Time)))
-    cycles = {time: limit_cycle(config, time=time, neuron=neuron, threshold_mV=threshold) for time in wanted}
-    if not give({"name": config.name, "n_segments": config.body.n_segments} | cycle_numbers(cycles)):
-        Console().print(cycle_table(f"{config.name}, {config.body.n_segments} segments", cycles))
+    cycle = limit_cycle(config, neuron=neuron, threshold_mV=threshold)
+    if not give({"name": config.name, "n_segments": config.body.n_segments} | cycle_numbers(cycle)):
+        Console().print(cycle_table(f"{config.name}, {config.body.n_segments} segments", cycle))
     if output is not None:
-        named = {TIMES[time]: cycle for time, cycle in cycles.items()}
-        print_paths([limit_cycle_figure(named, output)])
+        print_paths([limit_cycle_figure(cycle, output)])

@@ -10,7 +10,6 @@ from typing import Annotated
 import typer
 
 from annelid.cli import (
-    EXIT_SOME_FAILED,
     Jobs,
     OnlyPaths,
     Output,
@@ -18,7 +17,6 @@ from annelid.cli import (
     ResultsFolder,
     SchedulerAddress,
     command,
-    complain,
     end_study,
     going_on,
     kept_runs,
@@ -91,17 +89,14 @@ def bench_command(
     cases: Annotated[
         list[str] | None, typer.Option(metavar="LINE", help="Only these cases; may be repeated.  [default: all]")
     ] = None,
-    against: Annotated[
-        Path | None, typer.Option(metavar="bench.json", help="Fail if a case is over 10 % slower than it was there.")
-    ] = None,
     quiet: Quiet = False,
 ) -> None:
     """Measure speed and error side by side.
 
     Times closed loops with their recording, each in a process of its own on one core, and compares their
     elongation, period, travel, work and slip with a converged run, three times with slightly different friction.
-    Writes bench.json, bench.png and bench.svg: error against speed, processor time beside the paper's formulation,
-    cost against the number of segments, and where the time of a step goes.
+    Writes bench.json, with where the time of a step goes, and bench.png and .svg: error against speed, and cost
+    against the number of segments.
 
     \b
     --cases levels      the levels of --fidelity, riddle2025-muscles and riddle2023-fast, beside riddle2023
@@ -114,38 +109,23 @@ def bench_command(
     Every measurement is kept in bench/cases, so a second call goes on where the first one was stopped, and
     a full run takes over what --quick measured. Delete that folder to measure again.
 
-    --against compares with an earlier bench.json of the same machine. A machine is not as fast at all times: steps are
-    therefore counted in those of a small model of the engine alone, timed before and after each case.
-
     \b
     annelid study bench                                   everything, into the folder bench
     annelid study bench --quick                           an overview
     annelid study bench --cases levels -o levels          levels of fidelity and presets only
     annelid study bench --cases segments --cases chain    how the cost grows with the worm
-    annelid study bench --quick -o now --against before/bench.json    has it become slower?
     """
     from annelid.experiment import study_progress
-    from annelid.textfiles import read_json
-    from annelid_studies.bench.benchmark import SLOWDOWN, bench, in_yardsticks, slowdowns
-    from annelid_studies.bench.report import bench_figure, bench_table, slowdown_table
-
-    before = None if against is None else in_yardsticks(read_json(against))
+    from annelid_studies.bench.benchmark import bench
+    from annelid_studies.bench.report import bench_figure, bench_table
 
     lock(output)
     with going_on(output / "cases", kept="what was measured is kept"), study_progress(quiet=quiet) as progress:
         path = bench(output, "quick" if quick else "full", lines=cases or None, progress=progress)
     report = json.loads(path.read_text(encoding="utf-8"))
     tables = [] if quiet else [bench_table(report)]
-    slower = {} if before is None else slowdowns(in_yardsticks(report), before)
-    if slower and not quiet:
-        tables.append(slowdown_table(slower, SLOWDOWN))
     print_results((path, bench_figure(report, output / "bench")), *tables, quiet=quiet)
     end_study(len(report["cases"]), sum("failed" in case for case in report["cases"]), path)
-    if worst := [name for name, share in slower.items() if share > SLOWDOWN]:
-        load = max(case.get("load_average_1min") or 0.0 for case in report["cases"])
-        doubt = "; other programs ran meanwhile, so measure again alone" if load > 1.0 else ""
-        complain(f"slower than in {against} by over {100 * SLOWDOWN:.0f} %: {', '.join(worst)}{doubt}")
-        raise typer.Exit(EXIT_SOME_FAILED)
 
 
 @study("robustness")

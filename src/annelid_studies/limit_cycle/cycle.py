@@ -11,12 +11,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import reduce
 from itertools import accumulate
-from typing import Literal, cast, get_args
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.clock import StepRatio
 from annelid.config import RunConfig, load_config
 from annelid.control import paper_controller
 from annelid.errors import AnnelidError, ConfigError, suggest
@@ -32,8 +31,6 @@ from annelid_studies.limit_cycle.flow import (
     first_share,
     travel,
 )
-
-Time = Literal["continuous", "steps"]  # how a worm's time is taken; see `limit_cycle`
 
 # Step whose change is the vector field, and the step that the field is integrated with, s.
 _FIELD_STEP_S = 1e-5
@@ -94,19 +91,15 @@ class LimitCycle:
 def limit_cycle(
     config: RunConfig,
     *,
-    time: Time = "continuous",
     neuron: str = "contraction_1",
     threshold_mV: float | None = None,
     settle_s: float = 5.0,
     n_phases: int = 100,
 ) -> LimitCycle:
-    """Finds the limit cycle of a configured worm under its nervous system.
+    """Finds the limit cycle of a configured worm under its nervous system, in continuous time (`Continuous`).
 
     Args:
         config: A configuration with a planar body and the synthetic nervous system, without sensor noise.
-        time: ``"steps"``: the worm's own steps, shortened where a sensor switches; ``"continuous"``: the differential
-            equation that the steps approximate, integrated by a method of third order that also locates the kinks of
-            the synapses. The linearisation is faithful in the latter only.
         neuron: The cycle begins when this neuron's potential rises through the threshold.
         threshold_mV: Relative to rest; default: half of the operating range R.
         settle_s: Simulated time before the search begins, s, longer than ``sensor.startup_hold_s``.
@@ -120,42 +113,33 @@ def limit_cycle(
     network = paper_controller(config.controller)
     if network is None:
         raise ConfigError(f"controller.kind = {config.controller.kind!r} has no neurons whose rise could begin a cycle")
-    flow, state, switches = flow_of(config, time, settle_s)
+    flow, state, switches = flow_of(config, settle_s)
     section = section_at(flow, neuron, 0.5 * network.range_mV if threshold_mV is None else threshold_mV)
     # The field's rounding, divided by its short step, leaves no more digits.
-    tolerance = 1e-7 if time == "continuous" else 1e-9
-    return find_limit_cycle(flow, state, switches, section, n_phases=n_phases, tolerance=tolerance)
+    return find_limit_cycle(flow, state, switches, section, n_phases=n_phases, tolerance=1e-7)
 
 
-def flow_of(config: RunConfig, time: Time = "continuous", settle_s: float = 5.0) -> tuple[Flow, Array, Switches]:
+def flow_of(config: RunConfig, settle_s: float = 5.0) -> tuple[Continuous, Array, Switches]:
     """Builds the closed loop of a configuration and lets it run until its start is over.
 
-    Arguments and errors are those of `limit_cycle`; a continuous flow needs a planar body and a controller that is the
-    same at every time step.
+    Arguments and errors are those of `limit_cycle`.
 
     Returns:
         The flow, its states ``(1, n_states)`` and its switches ``(1, n_switches)``.
     """
-    if time not in get_args(Time):
-        raise ConfigError(f"unknown time {time!r}: {suggest(time, get_args(Time))}")
     if config.sensor.noise_m > 0.0:
         raise ConfigError(f"sensor.noise_m = {config.sensor.noise_m:g} m leaves no limit cycle: set sensor.noise_m=0")
     if not settle_s > config.sensor.startup_hold_s:
         raise ConfigError(
             f"settle_s = {settle_s:g} must be longer than sensor.startup_hold_s = {config.sensor.startup_hold_s:g}"
         )
-    clock = config.clock
-    stride = StepRatio(clock.control_timestep_s, clock.physics_timestep_s).control_steps_per_move
     plant = build_plant(config)
     controller = build_controller(config, plant)
-    flow, state, switches = settled(plant, controller, clock.control_timestep_s, settle_s, stride=stride)
-    if time != "continuous":
-        return flow, state, switches
+    settle(plant, controller, config.clock.control_timestep_s, settle_s)
     # The same loop in forward Euler steps so short that they are the vector field.
     tree = config.model_dump()
     tree["clock"] = {"control_timestep_s": _FIELD_STEP_S, "physics_timestep_s": _FIELD_STEP_S}
-    if paper_controller(config.controller) is not None:
-        tree["controller"]["scheme"] = "euler"
+    tree["controller"]["scheme"] = "euler"
     # Time runs slower there, and must not come back into the hold.
     tree["sensor"]["startup_hold_s"] = 0.0
     tree["record"] = {"signals_interval_s": config.duration_s, "frames_interval_s": config.duration_s}
@@ -164,40 +148,31 @@ def flow_of(config: RunConfig, time: Time = "continuous", settle_s: float = 5.0)
     nerves = build_controller(short, body)
     for new, old in ((body, plant), (nerves, controller)):
         cast(Stateful, new).set_state(cast(Stateful, old).get_state())
-    loop = ClosedLoop(body, nerves, _FIELD_STEP_S, kinks=True)
+    loop = ClosedLoop(body, nerves, _FIELD_STEP_S)
     return Continuous(loop, _CONTINUOUS_STEP_S), *loop.present()
 
 
-def settled(
-    plant: Plant, controller: Controller, control_timestep_s: float, settle_s: float, *, stride: int = 1
-) -> tuple[ClosedLoop, Array, Switches]:
-    """Lets any plant and controller run from their reset for ``settle_s``, and makes the closed loop of them.
-
-    The body moves every ``stride`` control steps.
-
-    Returns:
-        The loop, its states ``(1, n_states)`` and its switches ``(1, n_switches)``.
+def settle(plant: Plant, controller: Controller, control_timestep_s: float, settle_s: float) -> None:
+    """Lets a plant and a controller run from their reset.
 
     Raises:
         ConfigError: The loop depends on time itself, or cannot be linearised (`ClosedLoop`).
     """
     sensation = plant.reset(0)
     controller.reset(0)
-    earlier = ClosedLoop(plant, controller, control_timestep_s, stride)
-    n_steps = stride * max(2, round(settle_s / control_timestep_s / stride))
-    middle = n_steps // stride // 2 * stride
+    earlier = ClosedLoop(plant, controller, control_timestep_s)
+    n_steps = max(2, round(settle_s / control_timestep_s))
     for step in range(n_steps):
-        if step == middle:
-            earlier = ClosedLoop(plant, controller, control_timestep_s, stride)
+        if step == n_steps // 2:
+            earlier = ClosedLoop(plant, controller, control_timestep_s)
         sensation = plant.step(controller.step(sensation))
-    loop = ClosedLoop(plant, controller, control_timestep_s, stride)
+    loop = ClosedLoop(plant, controller, control_timestep_s)
     state, switches = loop.present()
     if not all(map(np.array_equal, loop.step(state, switches), earlier.step(state, switches))):
         raise ConfigError(
             f"{type(plant).__name__} under {type(controller).__name__} depends on time itself, not on its state alone: "
             "only an autonomous loop has a limit cycle of its own"
         )
-    return loop, state, switches
 
 
 def section_at(flow: Flow, label: str, threshold: float) -> Section:

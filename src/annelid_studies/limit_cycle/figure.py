@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from annelid.draw import canvas, panel_title, plain, plot_path, save, segment_colors
+from annelid.draw import canvas, panel_title, plot_path, save, segment_colors
 from annelid_studies.limit_cycle.cycle import LimitCycle
 
 if TYPE_CHECKING:
@@ -16,20 +15,18 @@ if TYPE_CHECKING:
 
 _ROLES = {"contraction": "-", "expansion": "--", "sensory": "-.", "relay": ":"}
 _LEAST = 1e-16
-_MARKERS = "os^"
 # Responses up to this are drawn to scale, greater ones by their logarithm, ms/mV.
 _LINEAR_MS_PER_MV = 1.0
 
 
-def limit_cycle_figure(cycles: Mapping[str, LimitCycle], path: str | Path) -> Path:
+def limit_cycle_figure(main: LimitCycle, path: str | Path) -> Path:
     """Draws potentials and phase response of the first segment's neurons over a cycle, and the multipliers.
 
     Args:
-        cycles: Limit cycles of one worm by the name in the legend; the first is drawn over its phase.
+        main: The limit cycle, drawn over its phase.
         path: File to write: ``.png``, ``.pdf`` or ``.svg``; a name without a suffix becomes a ``.png``.
     """
     path = plot_path(path)
-    main = next(iter(cycles.values()))
     with canvas(6.6) as figure:
         orbit, response, multipliers = figure.subplots(3, 1, height_ratios=[1.0, 1.2, 1.0])
         _neurons(orbit, main, main.state)
@@ -45,7 +42,7 @@ def limit_cycle_figure(cycles: Mapping[str, LimitCycle], path: str | Path) -> Pa
             axes.set_xlim(0.0, 1.0)
             for time in main.switch_time_s:
                 axes.axvline(time / main.period_s, color="0.8", linestyle=":", linewidth=0.5, zorder=0)
-        _magnitudes(multipliers, cycles)
+        _magnitudes(multipliers, main)
         return save(figure, path)
 
 
@@ -57,14 +54,10 @@ def _neurons(axes: Axes, cycle: LimitCycle, values: np.ndarray) -> None:
             axes.plot(phase, values[:, cycle.labels.index(label)], style, color=color, label=role)
 
 
-def _magnitudes(axes: Axes, cycles: Mapping[str, LimitCycle]) -> None:
-    for marker, color, (name, cycle) in zip(_MARKERS, segment_colors(3), cycles.items(), strict=False):
-        sizes = np.maximum(np.abs(cycle.multipliers), _LEAST)
-        fill = color if marker == _MARKERS[0] else "none"
-        look = {"color": color, "markersize": 4.0, "markerfacecolor": fill, "label": plain(name)}
-        axes.plot(np.arange(1, len(sizes) + 1), sizes, marker, **look)
+def _magnitudes(axes: Axes, cycle: LimitCycle) -> None:
+    sizes = np.maximum(np.abs(cycle.multipliers), _LEAST)
+    axes.plot(np.arange(1, len(sizes) + 1), sizes, "o", color=segment_colors(3)[0], markersize=4.0)
     axes.axhline(1.0, color="0.35", linestyle=":", linewidth=1.0)
     axes.set(yscale="log", ylim=(_LEAST / 3.0, 30.0), ylabel="magnitude", xlabel="Floquet multiplier, by magnitude")
     axes.locator_params(axis="x", integer=True)
     panel_title(axes, "Floquet multipliers")
-    axes.legend(loc="center right")

@@ -95,17 +95,13 @@ class ClosedLoop:
     ``height[2]``.
     """
 
-    def __init__(
-        self, plant: Plant, controller: Controller, control_timestep_s: float, stride: int = 1, *, kinks: bool = False
-    ) -> None:
+    def __init__(self, plant: Plant, controller: Controller, control_timestep_s: float) -> None:
         """Takes a plant and a controller, which are stepped by this from now on.
 
         Args:
             plant: The body.
             controller: The controller.
             control_timestep_s: Duration of a control step, s.
-            stride: Control steps a step, more than 1 where the body moves in coarser steps than the controller.
-            kinks: Count kinks of the controller's equations among the switches, where it is `Piecewise`.
 
         Raises:
             ConfigError: One of them cannot be saved, restored and advanced in many copies, or has too many states.
@@ -116,10 +112,9 @@ class ClosedLoop:
                     f"{type(part).__name__} has no limit cycle to find, since copies of it cannot be advanced at once: "
                     "choose the body riddle2022 and the controller sns"
                 )
-        self.timestep_s = control_timestep_s * stride
-        self._stride = stride
+        self.timestep_s = control_timestep_s
         self._parts = (plant, controller)
-        self._piecewise = controller if kinks and isinstance(controller, Piecewise) else None
+        self._piecewise = controller if isinstance(controller, Piecewise) else None
         self._made_of = self._states()
         self._rest: list[State] = [
             {name: array for name, array in state.items() if array.dtype.kind not in "fb"} for state in self._made_of
@@ -179,10 +174,8 @@ class ClosedLoop:
     def _step_copies(self, parts: list[State]) -> list[State]:
         plant, controller = cast(BatchedPlant, self._parts[0]), cast(BatchedController, self._parts[1])
         of_plant, of_controller = (part | rest for part, rest in zip(parts, self._rest, strict=True))
-        for _ in range(self._stride):
-            of_controller, activation = controller.step_copies(of_controller, plant.sense_copies(of_plant))
-            of_plant = plant.step_copies(of_plant, activation)
-        return [of_plant, of_controller]
+        of_controller, activation = controller.step_copies(of_controller, plant.sense_copies(of_plant))
+        return [plant.step_copies(of_plant, activation), of_controller]
 
 
 def _labels(part: object, name: str, size: int) -> list[str]:

@@ -1,8 +1,7 @@
-"""Limit cycles as a table, and as numbers for JSON."""
+"""A limit cycle as a table, and as numbers for JSON."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from annelid.draw import framed_table
@@ -12,45 +11,34 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 _MULTIPLIERS_SHOWN = 4
-TIMES = {
-    "continuous": "continuous time",
-    "steps": "own steps",
-}
-"""Headings of limit cycles, by `annelid_studies.limit_cycle.cycle.Time`."""
 # A smaller multiplier is lost in products of rounded matrices.
 _ROUNDING = 1e-12
 
 
-def cycle_table(name: str, cycles: Mapping[str, LimitCycle]) -> Table:
-    """Returns the limit cycles of one worm by their `Time`, with the largest multipliers."""
-    main = next(iter(cycles.values()))
+def cycle_table(name: str, cycle: LimitCycle) -> Table:
+    """Returns a limit cycle with its largest multipliers."""
     caption = "A multiplier is what one cycle leaves of a small deviation; the one at 1 is a shift along the cycle."
-    if set(cycles) != {"continuous"}:
-        caption += " In steps none is at 1: a shift by less than a step is not one along the cycle."
-    title = f"{name}: limit cycle in {len(main.labels)} states"
-    # Title and caption would fold where there is only one column.
-    table = framed_table("quantity", *(TIMES[time] for time in cycles), title=title, caption=caption, min_width=72)
-    table.add_row("period (ms)", *(f"{1e3 * cycle.period_s:.2f}" for cycle in cycles.values()))
-    for i in range(min(_MULTIPLIERS_SHOWN, len(main.labels))):
-        table.add_row(f"multiplier {i + 1}", *(_multiplier(cycle.multipliers[i]) for cycle in cycles.values()))
-    table.add_row("orbit closes within", *(f"{cycle.closing_error:.0e} of a range" for cycle in cycles.values()))
+    title = f"{name}: limit cycle in {len(cycle.labels)} states"
+    # Title and caption would fold.
+    table = framed_table("quantity", "", title=title, caption=caption, min_width=72)
+    table.add_row("period (ms)", f"{1e3 * cycle.period_s:.2f}")
+    for i, multiplier in enumerate(cycle.multipliers[:_MULTIPLIERS_SHOWN], start=1):
+        table.add_row(f"multiplier {i}", _multiplier(multiplier))
+    table.add_row("orbit closes within", f"{cycle.closing_error:.0e} of a range")
     return table
 
 
-def cycle_numbers(cycles: Mapping[str, LimitCycle]) -> dict[str, Any]:
+def cycle_numbers(cycle: LimitCycle) -> dict[str, Any]:
     """Returns the same numbers for JSON: multipliers as pairs of real and imaginary part, times in s."""
     return {
-        time: {
-            "period_s": cycle.period_s,
-            "timestep_s": cycle.timestep_s,
-            "closing_error": cycle.closing_error,
-            "multipliers": [[float(value.real), float(value.imag)] for value in cycle.multipliers],
-            "trivial": cycle.trivial,
-            "states": list(cycle.labels),
-            "phase_s": cycle.time_s.tolist(),
-            "phase_response_s": cycle.phase_response.tolist(),
-        }
-        for time, cycle in cycles.items()
+        "period_s": cycle.period_s,
+        "timestep_s": cycle.timestep_s,
+        "closing_error": cycle.closing_error,
+        "multipliers": [[float(value.real), float(value.imag)] for value in cycle.multipliers],
+        "trivial": cycle.trivial,
+        "states": list(cycle.labels),
+        "phase_s": cycle.time_s.tolist(),
+        "phase_response_s": cycle.phase_response.tolist(),
     }
 
 

@@ -221,22 +221,6 @@ def test_without_a_fault_all_commands_arrive(tmp_path: Path) -> None:
     np.testing.assert_allclose(run.data["robot_latency"].values[1:], 0.001, atol=1e-5)
 
 
-def test_random_loss_damage_and_delay(tmp_path: Path) -> None:
-    """A tenth of all frames each way; the watchdog's five in a row do not occur in these."""
-    rng = np.random.default_rng(4)
-
-    def fault(way: str, n: int, data: bytes) -> Arrivals:
-        names = [*FAULTS][: [*FAULTS].index("a stop")]
-        return FAULTS[str(rng.choice(names))](data) if n > 6 and rng.random() < 0.1 else [(0.0, data)]
-
-    body = Body()
-    line = Line(robot(body), FakeClock(), fault)
-    ended = loop(line, tmp_path / "run")
-    check(line, body, tmp_path / "run", ended)
-    assert not ended
-    assert open_run(tmp_path / "run").warnings
-
-
 def test_an_error_of_the_robot_and_one_of_the_controller(tmp_path: Path) -> None:
     body = Body()
 

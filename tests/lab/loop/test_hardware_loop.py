@@ -325,10 +325,8 @@ def test_a_robot_and_firmware_over_udp(tmp_path: Path) -> None:
         (["--robot", "/dev/null@fast"], "has no rate behind the @"),
         (["--firmware", "udp:127.0.0.1:9", "--most", "0.5"], "they need --robot or --servos"),
         (["--robot", "udp:127.0.0.1:9", "--rate", "300"], "a period must be 1 .. 1000 control steps"),
-        (["--robot", "udp:127.0.0.1:9", "--ticks", "0", "9"], "they need --servos"),
         (["--servos", "udp:127.0.0.1:9", "--ticks", "9", "9"], "relaxed and contracted must differ"),
         (["--robot", "udp:127.0.0.1:9", "--least", "2"], "0 <= lowest < highest <= 1"),
-        (["--robot", "udp:127.0.0.1:9", "--firmware", "udp:127.0.0.1:9", "--sense", "smell"], "'smell' can be sensed"),
     ],
 )
 def test_the_command_refuses_in_a_sentence(words: list[str], sentence: str, tmp_path: Path) -> None:

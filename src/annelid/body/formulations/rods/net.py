@@ -20,11 +20,12 @@ import numpy as np
 
 from annelid.arena.friction import skin_options
 from annelid.body.actuation import crossing_site, mark_crossing
-from annelid.body.constraint_rows import add_held_coordinate, add_holder, add_tie
+from annelid.body.constraint_rows import LEAST_INERTIA_KG_M2, add_held_coordinate, add_holder, add_tie
 from annelid.body.formulations import Tie, densities_kg_per_m
 from annelid.body.formulations.rods.strains import add_strains, net_stiffness, twist_name
 from annelid.body.mesh import MeshBody, Strands
 from annelid.config import ArenaKind
+from annelid.errors import ConfigError
 from annelid.morphology import Array, MeshGeometry
 
 AXES = np.eye(3)
@@ -36,6 +37,10 @@ SOLVER_ITERATIONS, SOLVER_TOLERANCE = 300, 1e-6
 """At 1e-4 what is pulled and held creeps by a percent; 1e-12 is the same as 1e-6 within 0.1 %."""
 TWIST_MASS_KG = 1e-9
 """The hinges carry polar inertia only; the engine refuses a body of no mass."""
+MOST_RAISED = 60.0
+"""How many times its own inertia of twist an edge may get, so that the engine takes it. In a step the stiffness
+outweighs that inertia some thousand times: a worm of 5 mm, which gets 56 times its own, elongates as a large one
+within 0.5 %."""
 
 
 def add_rods(
@@ -205,6 +210,11 @@ def add_rod(
         for edge in range(n_edges):
             hinge = twist_name(name, edge, n_edges).removeprefix(f"{name}_")
             inertia = 0.5 * density_kg_per_m[edge] * lengths[edge] * strands.radius_m**2
+            if (raised := LEAST_INERTIA_KG_M2 / inertia) > MOST_RAISED:
+                raise ConfigError(
+                    f"body.strands.radius_m = {strands.radius_m:.3g}: this worm is too small for the engine's numbers; "
+                    f"one of its shape must be at least {1.01 * (raised / MOST_RAISED) ** 0.2:.3g} times as large"
+                )
             holder = add_holder(part, hinge, TWIST_MASS_KG, inertia)
             holder.add_joint(name=hinge, type=mujoco.mjtJoint.mjJNT_HINGE, axis=AXES[0])
     spec.add_equality(

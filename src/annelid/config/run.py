@@ -46,18 +46,7 @@ def _known(name: str) -> str:
     return name
 
 
-class Checked:
-    """What sections have in common that are checked against the rest of a run."""
-
-    def check_with(self, config: RunConfig) -> None:
-        """Checks the section against the rest of a configuration.
-
-        Raises:
-            ValueError: They do not fit; the message names the fields, the value and what is valid.
-        """
-
-
-class ControllerKind(Checked, Kind):
+class ControllerKind(Kind):
     """Base of the controllers' sections.
 
     Attributes:
@@ -89,7 +78,7 @@ class ControllerKind(Checked, Kind):
         """
 
 
-class TurningKind(Checked, Kind):
+class TurningKind(Kind):
     """Base of the sections that scale the two sides of a worm with half-rings, by a rule with a state of its own.
 
     Attributes:
@@ -130,7 +119,7 @@ class TurningKind(Checked, Kind):
         """Returns what is left of the activation of each half, in [0, 1], ``(n_segments, 2)``: left and right half."""
 
 
-class BodyKind(Checked, Kind):
+class BodyKind(Kind):
     """Base of the bodies' sections: what analysis, pictures, views, exports and checks ask a body.
 
     A body has one of three shapes: the mesh of a 3D worm (`geometry`), the model of a robot (`own_model`), or that of a
@@ -263,7 +252,7 @@ class BodyKind(Checked, Kind):
         """
 
 
-class ArenaKind(Checked, Kind):
+class ArenaKind(Kind):
     """Base of the arenas' sections: the fields of every ground, and what the body, the pictures and the tasks ask it.
 
     Attributes:
@@ -367,7 +356,7 @@ SHARED = tuple(name for name in ArenaKind.model_fields if name != "kind")
 """Fields of every arena; a worm that is put elsewhere keeps those that the place does not state."""
 
 
-class TrialKind(Checked, Kind):
+class TrialKind(Kind):
     """Base of the sections of what goes wrong on purpose between a controller and its body; annelid has none itself."""
 
     registry: ClassVar[Registry[type[Any]]] = Registry("trial.kind")

@@ -35,14 +35,6 @@ def at(time_s: float, n_segments: int = 3) -> Sensation:
     return Sensation(time_s, unfelt, unfelt, unfelt[:, 0], unfelt[:, 0], np.zeros((n_segments, 3)), np.zeros(3))
 
 
-def test_without_a_ramp_activation_steps_at_start_and_stop() -> None:
-    activation = ProgramController(program((2, 0.3, 0.6, 0.8)), 3, 3).activation(
-        [0.0, 0.299, 0.3, 0.45, 0.599, 0.6, 2.0]
-    )
-    np.testing.assert_array_equal(activation[:, 1], [0, 0, 0.8, 0.8, 0.8, 0, 0])
-    assert not activation[:, [0, 2]].any()
-
-
 @given(start=st.integers(0, 5000), steps=st.integers(1, 3000))
 def test_a_contraction_lasts_exactly_its_number_of_control_steps(start: int, steps: int) -> None:
     """Whichever way the times of the steps are rounded."""
@@ -53,17 +45,15 @@ def test_a_contraction_lasts_exactly_its_number_of_control_steps(start: int, ste
         assert (on[0], len(on)) == (start, steps)
 
 
-def test_a_ramp_rises_from_the_start_and_falls_from_the_stop() -> None:
-    one = program((1, 1.0, 2.0, 0.6), ramp_s=0.2)
-    times = [0.9, 1.0, 1.05, 1.1, 1.2, 1.7, 2.0, 2.05, 2.1, 2.2, 3.0]
-    expected = [0.0, 0.0, 0.15, 0.3, 0.6, 0.6, 0.6, 0.45, 0.3, 0.0, 0.0]
-    np.testing.assert_allclose(ProgramController(one, 1, 1).activation(times)[:, 0], expected, atol=1e-12)
-
-
-def test_a_contraction_shorter_than_its_ramp_falls_from_what_it_has_reached() -> None:
-    one = program((1, 1.0, 1.1, 1.0), ramp_s=0.4)
-    activation = ProgramController(one, 1, 1).activation([1.0, 1.05, 1.1, 1.15, 1.2, 1.3])[:, 0]
-    np.testing.assert_allclose(activation, [0.0, 0.125, 0.25, 0.125, 0.0, 0.0], atol=1e-12)
+def test_a_ramp_rises_from_the_start_and_falls_from_what_it_has_reached() -> None:
+    for stop_s, ramp_s, levels in (
+        (1.5, 0.0, {0.999: 0, 1.0: 0.6, 1.499: 0.6, 1.5: 0, 3.0: 0}),
+        (2.0, 0.2, {0.9: 0, 1.0: 0, 1.05: 0.15, 1.1: 0.3, 1.2: 0.6, 2.0: 0.6, 2.05: 0.45, 2.2: 0, 3.0: 0}),
+        (1.1, 0.4, {1.0: 0, 1.05: 0.075, 1.1: 0.15, 1.15: 0.075, 1.2: 0, 1.3: 0}),
+    ):
+        activation = ProgramController(program((2, 1.0, stop_s, 0.6), ramp_s=ramp_s), 3, 3).activation([*levels])
+        np.testing.assert_allclose(activation[:, 1], [*levels.values()], atol=1e-12)
+        assert not activation[:, [0, 2]].any()
 
 
 contractions = st.tuples(st.integers(1, 4), st.floats(0, 5), st.floats(0.01, 3), st.floats(0.05, 1.0)).map(

@@ -252,5 +252,5 @@ def challenge_command(
         report.write_tasks(ranked, taus, output / "tasks.csv"),
         report.ranking_figure(ranked, output / "challenge"),
     ]
-    tables = report.ranking_table(ranked), report.cost_table(ranked), report.speed_table(ranked, taus)
+    tables = report.ranking_table(ranked), report.speed_table(ranked, taus)
     print_results(written, *tables, quiet=quiet)

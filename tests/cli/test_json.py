@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from importlib import import_module
 from inspect import isfunction
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -24,12 +25,7 @@ NO_RESULT = {
     "view": "a view goes on until it is closed",
     "cite": "BibTeX is a format for programs already",
 }
-ELSEWHERE = {
-    "paper",
-    "loop",
-    "calibrate",
-    *(f"study {name}" for name in ("paper", "bench", "robustness", "load-frame")),
-}
+ELSEWHERE = {"paper", "loop", "study paper", "study bench", "study load-frame"}
 """Commands that have the option as all others, and whose own tests run them."""
 ROWS = [{"run": "r7", "speed_m_per_s": 0.5, "slip": None, "ordered": True, "problem": "silent"}]
 """What the tables of the studies hold here that need minutes in earnest."""
@@ -80,6 +76,23 @@ STUDIES: dict[str, Fakes] = {
 """Commands whose runs take minutes or more, with what stands in their place."""
 
 
+def robustness(annelid: Command, finished: Path, monkeypatch: pytest.MonkeyPatch) -> Outcome:
+    def walked(folder: Path, *_: object, **__: object) -> list[object]:
+        (folder / "robustness.json").write_text('{"shares": {}, "judged": [{"score": NaN}]}')
+        return []
+
+    monkeypatch.setattr("annelid_studies.robustness.robustness", walked)
+    return annelid("study", "robustness", "--json")
+
+
+def calibrate(annelid: Command, finished: Path, monkeypatch: pytest.MonkeyPatch) -> Outcome:
+    report = "annelid_lab.calibration.report"
+    monkeypatch.setattr(f"{report}.identify", lambda *_: SimpleNamespace(intervals=SimpleNamespace(confused=())))
+    monkeypatch.setattr(f"{report}.write_identified", lambda _, folder: [folder / "calibrated.toml"])
+    monkeypatch.setattr(f"{report}.tables", lambda _: [])
+    return annelid("calibrate", "--json")
+
+
 def sweep(annelid: Command, finished: Path, monkeypatch: pytest.MonkeyPatch) -> Outcome:
     monkeypatch.setattr("annelid.experiment.sweep.sweep_figure", picture)
     Path("study.toml").write_text(STUDY.format(values="1.0, 0.9"))
@@ -123,6 +136,8 @@ DONE = {
     "list arenas": typed("list", "arenas"),
     "list numbers": typed("list", "numbers"),
     "doctor": typed("doctor"),
+    "study robustness": robustness,
+    "calibrate": calibrate,
     "sweep": sweep,
     "tune": tune,
 } | {name: faked(name) for name in STUDIES}

@@ -58,8 +58,6 @@ MAPS: Mapping[Effort, Sequence[NoiseMap]] = {
         NoiseMap(RIGID, (0.005, 0.008, 0.010, 0.012, 0.015, 0.020, 0.030), (0.0, 0.001, 0.002, 0.005), 5),
     ),
 }
-AT_THE_PAPERS_STEP = {tolerance_m: Case(CHAIN, {"sensor.tolerance_m": tolerance_m}) for tolerance_m in (0.008, 0.012)}
-"""The chain at 1 ms, without noise, on both sides of the paper's tolerance."""
 NOISE_AT_THE_PAPERS_STEP_M = 0.002
 NOISY_AT_THE_PAPERS_STEP = [
     Case(CHAIN, {"sensor.noise_m": NOISE_AT_THE_PAPERS_STEP_M, "seed": seed}) for seed in range(3)
@@ -69,7 +67,7 @@ NOISY_AT_THE_PAPERS_STEP = [
 
 def _cases(effort: Effort) -> list[Case]:
     mapped = [case for chart in MAPS[effort] for cell in chart.cells().values() for case in cell]
-    return [*mapped, *AT_THE_PAPERS_STEP.values(), *NOISY_AT_THE_PAPERS_STEP] if effort == "full" else mapped
+    return [*mapped, *NOISY_AT_THE_PAPERS_STEP] if effort == "full" else mapped
 
 
 def is_even(score: RhythmScore) -> bool:
@@ -128,10 +126,6 @@ def _examine(store: Store, effort: Effort) -> Findings:
         noisy = [store[case].rhythm.is_one_wave for case in NOISY_AT_THE_PAPERS_STEP]
         numbers["walking_share_noisy_papers_step"] = sum(noisy) / len(noisy)
         found |= {
-            "quiet": words.listed(
-                f"at {MM * tolerance:g} mm {words.rhythm(store[case].rhythm)}"
-                for tolerance, case in AT_THE_PAPERS_STEP.items()
-            ),
             "noise_mm": MM * NOISE_AT_THE_PAPERS_STEP_M,
             "n_noisy": sum(noisy),
             "of_noisy": len(noisy),

@@ -8,6 +8,7 @@ from functools import reduce
 from importlib import resources
 from importlib.resources.abc import Traversable
 from itertools import takewhile
+from os.path import isfile
 from pathlib import Path
 from typing import Any
 
@@ -103,6 +104,8 @@ def _files(folder: str) -> dict[str, Traversable]:
 
 def _text(folder: str, what: str, name: str) -> str:
     files = _files(folder)
+    if name not in files and Path(name).suffix and isfile(name):
+        raise ConfigError(f"{name} is no configuration: a file ends in .toml, a robot or a scene as MJCF in .xml")
     if name not in files:
         raise ConfigError(f"unknown {what} {shown(name)}: {suggest(name, files)}")
     return files[name].read_text(encoding="utf-8")
@@ -222,7 +225,7 @@ def _layers(
     source: str | Path | Mapping[str, Any], above: tuple[Path, ...] = ()
 ) -> list[tuple[str, Mapping[str, Any]]]:
     """Returns what a source states and what each states that it extends, with their names, the outermost first."""
-    default = None
+    default, folder = None, None
     if isinstance(source, Mapping):
         check_depth(source, "the configuration")
         name, own = "", dict(source)
@@ -231,6 +234,7 @@ def _layers(
         return [(shown(path.name), {"name": path.stem, **reader.from_file(path)})]
     elif isinstance(source, Path) or str(source).endswith(".toml"):
         path = Path(source)
+        folder = path.parent
         # Without line breaks, so that it stands in a comment.
         name, own = shown(path.name), read_toml(path)
         own.setdefault("name", path.stem)
@@ -251,7 +255,13 @@ def _layers(
         return [(name, own)]
     if not isinstance(base, str):
         raise ConfigError(f"extends = {shown(base)}: must be the name of a preset or of a TOML or MJCF file")
-    return [*_layers(base, above), (name, own)]
+    return [*_layers(base if folder is None else seen_from(folder, base), above), (name, own)]
+
+
+def seen_from(folder: Path, source: str) -> str:
+    """Returns a preset's name as it is, and the path of a file as it is seen from a folder."""
+    is_file = source.endswith(".toml") or kind_of_file(BodyKind, source) is not None
+    return str(folder / source) if is_file else source
 
 
 @dataclass(frozen=True)

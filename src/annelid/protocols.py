@@ -8,7 +8,6 @@ those capabilities and does without where they are absent.
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Protocol, runtime_checkable
@@ -30,7 +29,6 @@ __all__ = [
     "Signal",
     "State",
     "Stateful",
-    "Steering",
     "Stoppable",
     "StridingController",
     "Values",
@@ -284,25 +282,3 @@ class SavedAndRecorded:
     def _attrs(self) -> dict[str, float | int | str]:
         """Constants worth an attribute of the run file."""
         return {}
-
-
-class Steering(SavedAndRecorded, ABC):
-    """What is left of the activation of the two halves of every ring, at every control step.
-
-    Attributes:
-        senses: What it senses, names in `annelid.control.SENSED`.
-    """
-
-    senses: tuple[str, ...] = ()
-
-    @abstractmethod
-    def reset(self) -> None:
-        """Returns to the initial state: all halves whole."""
-
-    @abstractmethod
-    def advance(self, sensation: Sensation, n_steps: int) -> Array:
-        """Takes control steps with the same sensation but for its time.
-
-        Returns:
-            What is left afterwards, in [0, 1], ``(n_segments, 2)``: left and right half.
-        """

@@ -82,17 +82,23 @@ def read_json(path: Path, what: str = "") -> Any:
 
 def parse_toml(text: str, name: str) -> dict[str, Any]:
     """Reads TOML that an `UnreadableText` calls by a name where it is not valid, too long or too deep."""
-    if any(parts[0].count(".") >= MOST_LEVELS for parts in _KEY_PARTS.finditer(_bounded(text, name, len(text)))):
-        raise _too_deep(name)
-    return _parsed(tomllib.loads, "TOML", text, name)
+
+    def load(text: str) -> dict[str, Any]:
+        if any(parts[0].count(".") >= MOST_LEVELS for parts in _KEY_PARTS.finditer(text)):
+            raise RecursionError
+        return tomllib.loads(text)
+
+    return _parsed(load, "TOML", text, name)
 
 
 def parse_json(text: str, name: str) -> Any:
     """Reads JSON, as `parse_toml` reads TOML."""
-    return _parsed(json.loads, "JSON", _bounded(text, name, len(text)), name)
+    return _parsed(json.loads, "JSON", text, name)
 
 
 def _parsed(load: Callable[[str], Any], language: str, text: str, name: str) -> Any:
+    if len(text) > MOST_BYTES:
+        raise _too_long(name, MOST_BYTES)
     try:
         tree = load(text)
     except ValueError as error:
@@ -217,12 +223,6 @@ def _plain(value: Any) -> Any:
         return [_plain(item) for item in value]
     # numpy's numbers among them.
     return float(value) if isinstance(value, Real) and not isinstance(value, int | float) else value
-
-
-def _bounded(text: str, name: str, size: int) -> str:
-    if size > MOST_BYTES:
-        raise _too_long(name, MOST_BYTES)
-    return text
 
 
 def _too_long(name: str, most: int) -> UnreadableText:

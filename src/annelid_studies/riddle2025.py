@@ -15,14 +15,13 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
-from rich.table import Table as TerminalTable
 
 from annelid.analysis import Track, mean_and_interval, passage_of, track_of
 from annelid.draw import canvas, line_looks, panel_title, save_both
 from annelid.experiment import Case, Store
 from annelid.morphology import Array
 from annelid.simulation import Run
-from annelid_studies.tables import Results, grouped, tabulated, terminal_table, write_fields
+from annelid_studies.tables import Results, fields_table, grouped, write_fields
 from annelid_studies.worms import Effort
 
 CM = 100.0
@@ -216,24 +215,9 @@ def study(store: Store, output: Path, effort: Effort) -> Results:
     """The study `riddle2025`."""
     readings = compare(store, points(effort == "quick"))
     path = write_fields(Reading, readings, output / "riddle2025.csv")
-    return (path, comparison_picture(readings, path.with_suffix(""))), [comparison_table(readings)]
-
-
-def comparison_table(readings: Sequence[Reading]) -> TerminalTable:
-    """Lays out readings for the terminal."""
-    columns = {
-        "ground": lambda one: f"bend of {one.radius_m:g} m" if one.ground == "bend" else one.ground,
-        "gait": lambda one: one.gait + (", half the step" if one.half_step else ""),
-        "friction": lambda one: f"{one.friction:g}",
-        "runs": lambda one: str(one.runs),
-        "speed (cm/s)": lambda one: f"{CM * one.speed_m_per_s:.2f}",
-        "95 % interval": lambda one: (
-            "-" if one.runs < 2 else f"{CM * one.low_m_per_s:.2f} .. {CM * one.high_m_per_s:.2f}"
-        ),
-        "front out": lambda one: f"{one.came_out} of {one.runs}" if one.ground == "bend" else "",
-        "least way (m)": lambda one: f"{one.least_front_m:.2f}",
-    }
-    return terminal_table(tabulated(readings, columns), "The authors' later robot", n_words=2)
+    return (path, comparison_picture(readings, path.with_suffix(""))), [
+        fields_table(readings, "The authors' later robot")
+    ]
 
 
 def comparison_picture(readings: Sequence[Reading], stem: Path) -> Path:

@@ -10,11 +10,9 @@ random states in turn; the paper's from its own start, its best case. The first 
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import asdict, dataclass, replace
-from functools import partial
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -23,12 +21,11 @@ import numpy as np
 from scipy.stats import binomtest
 
 from annelid.analysis import DESIGN_INTERVAL_S, RhythmScore, lengthening_score, rhythm_score
-from annelid.errors import ConfigError, RunFileError, suggest
-from annelid.experiment import SHEAR_OVER_YOUNG, Case, Store, StudyProgress, case_key, code_fingerprint
+from annelid.errors import ConfigError, suggest
+from annelid.experiment import SHEAR_OVER_YOUNG, Case, Store, StudyProgress
 from annelid.markdown import Table, plain_table
 from annelid.output import write_text
 from annelid.simulation import locks
-from annelid.textfiles import read_json
 from annelid_studies.tables import grouped
 from annelid_studies.worms import PAPERS_RODS, RODS
 
@@ -42,8 +39,6 @@ CYCLES = 2.3
 """How long a run is judged, in design periods: the score needs two cycles of every segment."""
 STARTS = ("design", "silent", "random")
 """How the robust network starts, in turn."""
-TOGETHER = 8
-"""Points computed as one lot for each core, so that no process waits long for the lot's last run."""
 PERIOD_TOLERANCE = 0.1
 TIMED = {"kind": "timed", "rise_s": 0.0, "hold_s": DESIGN_INTERVAL_S, "fall_s": 0.0, "interval_s": DESIGN_INTERVAL_S}
 """A wave of the paper's turns: its muscles' rhythm is in time by construction, its segments' lengthening is not."""
@@ -108,7 +103,6 @@ class Judged:
     walked: bool  # Ordered, in one wave from front to rear, to the end
     in_time: bool  # Walked, with a period within 10 % of design
     lengthened: bool  # The segments lengthened in one wave from front to rear as well
-    code: str  # Digests of its run, with its configuration, code and engine, and of the code that judged it
 
 
 def points() -> tuple[Point, ...]:
@@ -131,13 +125,7 @@ def judge(
         walked=walked,
         in_time=walked and period is not None and abs(period / point.design_period_s - 1.0) <= PERIOD_TOLERANCE,
         lengthened=not message and lengthening.is_one_wave,
-        code=_made_by(point, controller),
     )
-
-
-def _made_by(point: Point, controller: str) -> str:
-    reading = code_fingerprint("annelid.analysis", __name__)
-    return f"{case_key(point.case(controller))} {reading}"
 
 
 @locks("folder")
@@ -147,29 +135,25 @@ def robustness(
     *,
     controllers: Sequence[str] = CONTROLLERS,
     n_segments: int | None = None,
-    keep: bool = False,
     executor: Executor | None = None,
     progress: StudyProgress | None = None,
 ) -> list[Judged]:
-    """Walks the first points of the sample under each controller, as far as the folder does not have their judgement.
+    """Walks the first points of the sample under each controller, as far as the folder does not have their runs.
 
     Args:
-        folder: Folder of the results; runs go to ``runs`` within it. Written after every run, so that a stopped study
-            shows what it has: ``robustness.json``, which a later call goes on from, and ``robustness.md``.
+        folder: Folder of the results, ``robustness.json`` and ``robustness.md``; runs go to ``runs`` within it.
         n_points: How many points, in the order drawn.
         controllers: Some of `CONTROLLERS`.
         n_segments: Gives every worm this many segments in place of its own, for a sample of the other quantities
             that costs less; None for the sample as it is.
-        keep: Keep what ``robustness.json`` says of points that other versions of the code have run.
         executor: Who computes the runs; None for a process of this machine on every core.
         progress: Called before the first and after every run.
 
     Returns:
-        The judgements that the folder holds now, by controller and point.
+        The judgements, by controller and point.
 
     Raises:
         ConfigError: No points, more than the sample has, or an unknown controller.
-        RunFileError: ``robustness.json`` is damaged.
         AnnelidError: A run cannot be built or written.
     """
     sample = points()
@@ -178,56 +162,20 @@ def robustness(
     for controller in controllers:
         if controller not in CONTROLLERS:
             raise ConfigError(f"unknown controller {controller!r}: {suggest(controller, CONTROLLERS)}")
-    chosen = sample if n_segments is None else tuple(replace(point, n_segments=n_segments) for point in sample)
-    judged = {
-        (one.controller, one.point): one
-        for one in read_judged(folder)
-        if one.n_segments == chosen[one.point].n_segments
-        and (keep or one.code == _made_by(chosen[one.point], one.controller))
-    }
-    missing = [(kind, i) for i in range(n_points) for kind in controllers if (kind, i) not in judged]
-    cases = {(kind, i): chosen[i].case(kind) for kind, i in missing}
-    store, total_s, before_s = Store(folder / "runs", executor), sum(case.cost_s for case in cases.values()), 0.0
-
-    def in_order() -> list[Judged]:
-        return [judged[key] for key in sorted(judged, key=lambda key: (CONTROLLERS.index(key[0]), key[1]))]
-
-    def judge_what_is_there(lot_s: float, _: str, __: int, ___: int, share: float) -> None:
-        for (kind, i), case in cases.items():
-            if (kind, i) not in judged and case in store:
-                run = store.run(case)
-                scores = rhythm_score(run, SETTLING_S), lengthening_score(run, SETTLING_S)
-                judged[kind, i] = judge(i, chosen[i], kind, *scores, store[case].message)
-        found = shares(in_order())
-        write_text(
-            folder / RESULTS, json.dumps({"shares": found, "judged": [*map(asdict, in_order())]}, indent=1) + "\n"
-        )
-        write_text(folder / "robustness.md", shares_table(found) + "\n")
-        if progress is not None:
-            done = sum(key in judged for key in cases)
-            progress("robustness", done, len(cases), (before_s + share * lot_s) / total_s)
-
-    waiting, size = list(cases.values()), TOGETHER * (os.cpu_count() or 1)
-    for lot in (waiting[first : first + size] for first in range(0, len(waiting), size)):
-        lot_s = sum(case.cost_s for case in lot)
-        store.compute(lot, progress=partial(judge_what_is_there, lot_s))
-        before_s += lot_s
-    return in_order()
-
-
-def read_judged(folder: Path) -> list[Judged]:
-    """Reads the judgements that a folder holds; none if it has no ``robustness.json``.
-
-    Raises:
-        RunFileError: The file is damaged.
-    """
-    path = folder / RESULTS
-    if not path.exists():
-        return []
-    try:
-        return [Judged(**one) for one in read_json(path)["judged"]]
-    except (ValueError, KeyError, TypeError) as error:
-        raise RunFileError(f"{path} is not what this version of annelid writes; move it away") from error
+    if n_segments is not None:
+        sample = tuple(replace(point, n_segments=n_segments) for point in sample)
+    cases = {(kind, i): sample[i].case(kind) for kind in controllers for i in range(n_points)}
+    store = Store(folder / "runs", executor, progress=progress)
+    store.compute(cases.values(), "robustness")
+    judged = []
+    for (kind, i), case in cases.items():
+        run = store.run(case)
+        scores = rhythm_score(run, SETTLING_S), lengthening_score(run, SETTLING_S)
+        judged.append(judge(i, sample[i], kind, *scores, store[case].message))
+    found = shares(judged)
+    write_text(folder / RESULTS, json.dumps({"shares": found, "judged": [*map(asdict, judged)]}, indent=1) + "\n")
+    write_text(folder / "robustness.md", shares_table(found) + "\n")
+    return judged
 
 
 def shares(judged: Sequence[Judged]) -> dict[str, dict[str, Any]]:

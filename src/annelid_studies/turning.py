@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.table import Table as TerminalTable
 
 from annelid.analysis import Track, track_of
 from annelid.draw import canvas, draw_lines, line_looks, panel_title, save_both
 from annelid.errors import RunFileError
 from annelid.experiment import Case, Store
-from annelid_studies.tables import Results, grouped, tabulated, terminal_table, write_fields
+from annelid_studies.tables import Results, fields_table, grouped, write_fields
 from annelid_studies.worms import Effort
 
 COUNTER = (1.0, 1.0, -1.0, -1.0, 1.0, 1.0)
@@ -164,22 +163,7 @@ def study(store: Store, output: Path, effort: Effort) -> Results:
     """The study `turning`."""
     readings, tracks = turning(store, QUICK if effort == "quick" else MODULATIONS)
     path = write_fields(Reading, readings, output / "turning.csv")
-    return (path, turning_picture(readings, tracks, path.with_suffix(""))), [turning_table(readings)]
-
-
-def turning_table(readings: Sequence[Reading]) -> TerminalTable:
-    """Lays out readings as a table for the terminal."""
-    columns: Mapping[str, Callable[[Reading], str]] = {
-        "gait": lambda one: one.gait,
-        "modulation": lambda one: f"{one.modulation:g}",
-        "in order": lambda one: {True: "yes", False: "no", None: "-"}[one.wave],
-        "cycle (s)": lambda one: f"{one.cycle_s:.2f}",
-        "speed (m/s)": lambda one: f"{one.speed_m_per_s:.3f}",
-        "deg a cycle": lambda one: f"{one.turn_deg_per_cycle:.1f}",
-        "radius (m)": lambda one: f"{one.radius_m:.2f}",
-        "rolled (deg)": lambda one: f"{one.roll_deg:.0f}",
-    }
-    return terminal_table(tabulated(readings, columns), "Turning")
+    return (path, turning_picture(readings, tracks, path.with_suffix(""))), [fields_table(readings, "Turning")]
 
 
 def turning_picture(readings: Sequence[Reading], tracks: Sequence[Track], stem: Path) -> Path:

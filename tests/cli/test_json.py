@@ -15,8 +15,7 @@ import pytest
 from typer.main import get_command
 
 from annelid.cli import app, entry
-from annelid.output import write_csv, write_json
-from annelid_studies.riddle2023.contents import Claim, Report, Table
+from annelid.output import write_csv
 from outcome import STUDY, Command, Outcome
 
 pytestmark = pytest.mark.usefixtures("runs_in_this_process", "undrawn")
@@ -26,11 +25,10 @@ NO_RESULT = {
     "view": "a view goes on until it is closed",
     "cite": "BibTeX is a format for programs already",
 }
+ELSEWHERE = {"paper", "loop", "study paper", "study bench", "study load-frame"}
+"""Commands that have the option as all others, and whose own tests run them."""
 ROWS = [{"run": "r7", "speed_m_per_s": 0.5, "slip": None, "ordered": True, "problem": "silent"}]
 """What the tables of the studies hold here that need minutes in earnest."""
-NUMBERS = Table(["quantity", "ours"], [["period", "2.629 s"]])
-CLAIM = Claim("results", "It walks", "Sect. 4", "2.635 s", "2.629 s", "It does.", "annelid run riddle2023", "holds")
-REPORT = Report("full", ["It walks."], NUMBERS, NUMBERS, [], [CLAIM], [], {"annelid": "0"})
 
 
 def write_rows(*arguments: Any) -> Path:
@@ -78,19 +76,6 @@ STUDIES: dict[str, Fakes] = {
 """Commands whose runs take minutes or more, with what stands in their place."""
 
 
-def paper(annelid: Command, finished: Path, monkeypatch: pytest.MonkeyPatch) -> Outcome:
-    monkeypatch.setattr("annelid_studies.riddle2023.paper.reproduce", lambda *_, **__: REPORT)
-    return annelid("paper", "--json")
-
-
-def bench(annelid: Command, finished: Path, monkeypatch: pytest.MonkeyPatch) -> Outcome:
-    content = {"cases": [], "speed": 2.0}
-    written = lambda folder, *_, **__: write_json(folder / "bench.json", content)  # noqa: E731
-    monkeypatch.setattr("annelid_studies.bench.benchmark.bench", written)
-    fake(monkeypatch, "annelid_studies.bench.report")
-    return annelid("study", "bench", "--json")
-
-
 def robustness(annelid: Command, finished: Path, monkeypatch: pytest.MonkeyPatch) -> Outcome:
     def walked(folder: Path, *_: object, **__: object) -> list[object]:
         (folder / "robustness.json").write_text('{"shares": {}, "judged": [{"score": NaN}]}')
@@ -103,8 +88,7 @@ def robustness(annelid: Command, finished: Path, monkeypatch: pytest.MonkeyPatch
 def calibrate(annelid: Command, finished: Path, monkeypatch: pytest.MonkeyPatch) -> Outcome:
     report = "annelid_lab.calibration.report"
     monkeypatch.setattr(f"{report}.identify", lambda *_: SimpleNamespace(intervals=SimpleNamespace(confused=())))
-    written = lambda _, folder: [write_json(folder / "calibration.json", {"n_tests": 3}), Path("calibrated.toml")]  # noqa: E731
-    monkeypatch.setattr(f"{report}.write_identified", written)
+    monkeypatch.setattr(f"{report}.write_identified", lambda _, folder: [folder / "calibrated.toml"])
     monkeypatch.setattr(f"{report}.tables", lambda _: [])
     return annelid("calibrate", "--json")
 
@@ -137,14 +121,7 @@ def faked(name: str) -> Callable[[Command, Path, pytest.MonkeyPatch], Outcome]:
     return run
 
 
-def loop(annelid: Command, _: Path, monkeypatch: pytest.MonkeyPatch) -> Outcome:
-    # Busy tests beside it must not end it.
-    quick = ("--duration", "0.2", "--rate", "20", "--watchdog", "40")
-    return annelid("loop", "riddle2023-rods", "--pseudo", *quick, "--json")
-
-
 DONE = {
-    "loop": loop,
     "run": typed("run", "riddle2022-planar", "--duration", "0.1", "--no-video"),
     "check": typed("check", "riddle2022-planar"),
     "export-network": typed("export-network", "riddle2022-planar"),
@@ -159,10 +136,6 @@ DONE = {
     "list arenas": typed("list", "arenas"),
     "list numbers": typed("list", "numbers"),
     "doctor": typed("doctor"),
-    "study load-frame": typed("study", "load-frame", "--displacement", "90"),
-    "paper": paper,
-    "study paper": paper,
-    "study bench": bench,
     "study robustness": robustness,
     "calibrate": calibrate,
     "sweep": sweep,
@@ -190,7 +163,7 @@ def strict(text: str) -> Any:
     return json.loads(text, parse_constant=refuse)
 
 
-@pytest.mark.parametrize("name", [*commands(get_command(app))])
+@pytest.mark.parametrize("name", [name for name in commands(get_command(app)) if name not in ELSEWHERE])
 def test_a_command_prints_its_result_as_json_and_nothing_else(
     annelid: Command, finished: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
@@ -244,7 +217,7 @@ def test_an_error_is_one_sentence_on_stderr_and_no_document(annelid: Command) ->
 
 
 def test_json_is_refused_beside_what_prints_something_else(annelid: Command) -> None:
-    for words in ("show RUN --verify", "presets wang", "arenas floor", "doctor --report", "sweep --example"):
+    for words in ("show RUN --verify", "presets wang", "arenas floor", "sweep --example"):
         done = annelid(*words.split(), "--json")
         assert (done.exit_code, done.out) == (entry.EXIT_USAGE, "")
         assert "does not go with" in " ".join(done.err.split())

@@ -11,10 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from annelid.analysis.paper import published
-from annelid.config import RunConfig, load_config, parse_assignments
+from annelid.config import RunConfig, load_config
 from annelid.control import ProgramController
 from annelid.control.open_loop import Contraction, Program
-from annelid.control.sns import Sns
 from annelid.errors import ConfigError
 from annelid.protocols import Sensation
 from annelid.simulation import simulate
@@ -36,14 +35,6 @@ def at(time_s: float, n_segments: int = 3) -> Sensation:
     return Sensation(time_s, unfelt, unfelt, unfelt[:, 0], unfelt[:, 0], np.zeros((n_segments, 3)), np.zeros(3))
 
 
-def test_without_a_ramp_activation_steps_at_start_and_stop() -> None:
-    activation = ProgramController(program((2, 0.3, 0.6, 0.8)), 3, 3).activation(
-        [0.0, 0.299, 0.3, 0.45, 0.599, 0.6, 2.0]
-    )
-    np.testing.assert_array_equal(activation[:, 1], [0, 0, 0.8, 0.8, 0.8, 0, 0])
-    assert not activation[:, [0, 2]].any()
-
-
 @given(start=st.integers(0, 5000), steps=st.integers(1, 3000))
 def test_a_contraction_lasts_exactly_its_number_of_control_steps(start: int, steps: int) -> None:
     """Whichever way the times of the steps are rounded."""
@@ -54,17 +45,15 @@ def test_a_contraction_lasts_exactly_its_number_of_control_steps(start: int, ste
         assert (on[0], len(on)) == (start, steps)
 
 
-def test_a_ramp_rises_from_the_start_and_falls_from_the_stop() -> None:
-    one = program((1, 1.0, 2.0, 0.6), ramp_s=0.2)
-    times = [0.9, 1.0, 1.05, 1.1, 1.2, 1.7, 2.0, 2.05, 2.1, 2.2, 3.0]
-    expected = [0.0, 0.0, 0.15, 0.3, 0.6, 0.6, 0.6, 0.45, 0.3, 0.0, 0.0]
-    np.testing.assert_allclose(ProgramController(one, 1, 1).activation(times)[:, 0], expected, atol=1e-12)
-
-
-def test_a_contraction_shorter_than_its_ramp_falls_from_what_it_has_reached() -> None:
-    one = program((1, 1.0, 1.1, 1.0), ramp_s=0.4)
-    activation = ProgramController(one, 1, 1).activation([1.0, 1.05, 1.1, 1.15, 1.2, 1.3])[:, 0]
-    np.testing.assert_allclose(activation, [0.0, 0.125, 0.25, 0.125, 0.0, 0.0], atol=1e-12)
+def test_a_ramp_rises_from_the_start_and_falls_from_what_it_has_reached() -> None:
+    for stop_s, ramp_s, levels in (
+        (1.5, 0.0, {0.999: 0, 1.0: 0.6, 1.499: 0.6, 1.5: 0, 3.0: 0}),
+        (2.0, 0.2, {0.9: 0, 1.0: 0, 1.05: 0.15, 1.1: 0.3, 1.2: 0.6, 2.0: 0.6, 2.05: 0.45, 2.2: 0, 3.0: 0}),
+        (1.1, 0.4, {1.0: 0, 1.05: 0.075, 1.1: 0.15, 1.15: 0.075, 1.2: 0, 1.3: 0}),
+    ):
+        activation = ProgramController(program((2, 1.0, stop_s, 0.6), ramp_s=ramp_s), 3, 3).activation([*levels])
+        np.testing.assert_allclose(activation[:, 1], [*levels.values()], atol=1e-12)
+        assert not activation[:, [0, 2]].any()
 
 
 contractions = st.tuples(st.integers(1, 4), st.floats(0, 5), st.floats(0.01, 3), st.floats(0.05, 1.0)).map(
@@ -102,42 +91,10 @@ def test_a_bad_contraction_is_refused_in_one_sentence(subtests: pytest.Subtests)
             assert "\n" not in str(caught.value)
 
 
-def test_a_bad_program_is_refused(subtests: pytest.Subtests) -> None:
-    for overrides, sentence in (
-        ({"controller.kind": "program"}, r"^controller\.contractions must be given$"),
-        (programmed(ONE, gate_time_constant_ms=250.0), "belongs to another kind. Valid here: contractions, kind"),
-        ({"controller.contractions": [ONE]}, "belongs to another kind"),
-    ):
-        with subtests.test(f"{overrides!r:.60}"), pytest.raises(ConfigError, match=sentence):
-            load_config("riddle2022-planar", overrides)
-
-
 def test_a_segment_must_exist_on_whatever_body() -> None:
     with pytest.raises(ConfigError, match=r"n_muscles = 5 .* give 3 \(rings\) or 6 \(half-rings\)"):
         ProgramController(program(), 3, 5)
     assert load_config("riddle2023-rods", {**programmed({**ONE, "segment": 4}), "body.mesh.n_segments": 4}).seed == 0
-
-
-def test_a_section_of_another_kind_keeps_nothing_of_the_preset_s(tmp_path: Path) -> None:
-    expected = Program(contractions=(Contraction(segment=1, start_s=0.0, stop_s=0.6),))
-    assert load_config("riddle2023-rods", programmed(ONE)).controller == expected
-    text = "controller.contractions=[{segment=1, start_s=0.0, stop_s=0.6}]"
-    for order in ([text, "controller.kind=program"], ["controller.kind=program", text]):
-        assert load_config("riddle2023-rods", parse_assignments(order)).controller == expected
-    file = tmp_path / "squeeze.toml"
-    file.write_text(
-        'extends = "riddle2023"\n[controller]\nkind = "program"\n'
-        "[[controller.contractions]]\nsegment = 1\nstart_s = 0.0\nstop_s = 0.6\n",
-        encoding="utf-8",
-    )
-    config = load_config(file)
-    assert config.controller == expected
-    assert config.body == load_config("riddle2023").body
-    again = tmp_path / "again.toml"
-    again.write_text(f'extends = "{file.as_posix()}"\n[controller]\nramp_s = 0.1\n', encoding="utf-8")
-    assert load_config(again).controller == expected.model_copy(update={"ramp_s": 0.1})
-    back = load_config({"extends": file.as_posix(), "controller": {"kind": "sns", "kick_nA": 2.0}})
-    assert back.controller == Sns(kick_nA=2.0)
 
 
 def test_it_is_listed_saved_and_not_laid_beside_the_paper() -> None:

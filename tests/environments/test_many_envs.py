@@ -8,7 +8,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
-from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
+from gymnasium.vector import AsyncVectorEnv
 from worms import CHEAP, same
 
 import annelid.environments
@@ -45,10 +45,8 @@ def test_a_worm_in_a_process_of_its_own_is_bit_for_bit_the_one_that_moves_alone(
     assert not same(observations[0], observations[2])
 
 
-@pytest.mark.parametrize(("mode", "made"), [("sync", SyncVectorEnv), ("async", AsyncVectorEnv)])
-def test_gymnasium_makes_many_by_name(mode: str, made: type[SyncVectorEnv] | type[AsyncVectorEnv]) -> None:
-    envs = gymnasium.make_vec("annelid/Worm-v0", num_envs=2, vectorization_mode=mode, **CHEAP)
-    assert isinstance(envs, made)
+def test_gymnasium_makes_many_by_name() -> None:
+    envs = gymnasium.make_vec("annelid/Worm-v0", num_envs=2, vectorization_mode="sync", **CHEAP)
     observations, _ = envs.reset(seed=0)
     assert observations.shape == envs.observation_space.shape
     layout, *_ = envs.get_attr("layout")

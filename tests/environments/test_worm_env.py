@@ -17,6 +17,7 @@ from worms import CHEAP, same
 from annelid.body.worm import WormBody
 from annelid.environments import ENVIRONMENTS, WormEnv
 from annelid.errors import AnnelidError, ConfigError, MissingDependency
+from annelid_studies.riddle2023.figures.renderings import rendering_works
 
 TERMS = ("reward_progress", "reward_effort", "reward_slip", "reward_success", "reward_failure")
 
@@ -70,6 +71,7 @@ def test_a_worm_at_rest_feels_nothing_and_lies_on_its_belly(env: WormEnv) -> Non
     assert np.allclose(observed.pop("heading"), [1.0, 0.0, 0.0])
     assert np.allclose(observed.pop("upright"), [1.0, 0.0])
     assert all(np.allclose(value, 0.0) for value in observed.values())
+    assert quiet.render() is None
 
 
 def test_an_observation_is_what_the_worm_does(env: WormEnv) -> None:
@@ -218,3 +220,17 @@ def test_without_gymnasium_the_line_that_installs_it_is_named(monkeypatch: pytes
     monkeypatch.delitem(sys.modules, "annelid.environments")
     with pytest.raises(MissingDependency, match="pip install 'annelid\\[gym\\]'"):
         importlib.import_module("annelid.environments")
+
+
+@pytest.mark.skipif(not rendering_works(), reason="no OpenGL back-end works on this machine")
+def test_a_picture_shows_the_worm_as_it_is_now() -> None:
+    env = WormEnv(**CHEAP, render_mode="rgb_array", width=96, height=64)
+    pictures = []
+    env.reset(seed=0)
+    for _ in range(2):
+        pictures.append(np.array(env.render(), dtype=int))
+        env.step(np.array([0.0, 1.0, 0.0]))
+    env.close()
+    assert pictures[0].shape == (64, 96, 3)
+    assert pictures[0].std() > 5.0
+    assert np.abs(pictures[0] - pictures[1]).max() > 20

@@ -10,12 +10,9 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from annelid.draw.figures.sweep import (
-    _label,
     _line,
     _map,
-    quantity,
     sweep_figure,
-    worded,
 )
 
 FIELDS = {
@@ -60,13 +57,6 @@ def test_nothing_but_failures_is_drawn_too(tmp_path: Path) -> None:
         assert sweep_figure(data, list(FIELDS)[:n], ["speed_m_per_s"], tmp_path / f"{n}").exists()
 
 
-def test_labels_have_the_unit_once() -> None:
-    assert worded("speed_m_per_s", "m/s") == "speed (m/s)"
-    assert worded("heading_change_rad", "rad") == "heading change (rad)"
-    assert worded("slip_ratio", "1") == "slip ratio"
-    assert _label(grid(list(FIELDS), False)["controller.gate_time_constant_ms"]) == "gate time constant (ms)"
-
-
 def drawn(values: np.ndarray, **attrs: str) -> xr.Dataset:
     coords = {f: (f, np.arange(n, dtype=float), {"units": "1"}) for f, n in zip("ab", values.shape, strict=True)}
     return xr.Dataset({"speed_m_per_s": (("a", "b"), values, {"units": "m/s", **attrs})}, coords)
@@ -84,13 +74,6 @@ def test_values_stand_in_the_cells_of_a_map_where_they_fit() -> None:
     assert cells(values) == [((0, 0), "0.123"), ((0, 1), "-0.02"), ((1, 1), "12.3")]
     assert cells(np.zeros((40, 2))) == []
     assert cells(np.zeros((2, 40))) == []
-
-
-def test_numbers_are_named_in_words_with_their_unit() -> None:
-    named = drawn(np.zeros((1, 1)), long_name="speed towards the front")["speed_m_per_s"]
-    assert quantity(named) == "speed towards the front (m/s)"
-    assert quantity(drawn(np.zeros((1, 1)))["speed_m_per_s"]) == "speed (m/s)"
-    assert max(map(len, quantity(named, 12).splitlines())) <= 12
 
 
 def test_repeats_have_the_interval_of_students_t() -> None:

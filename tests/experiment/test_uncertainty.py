@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import shlex
-import statistics
 import tempfile
 from collections.abc import Mapping
 from math import exp, sqrt
@@ -82,14 +81,6 @@ def test_a_sample_has_the_mean_errors_and_correlation_that_were_asked_for(known:
 def test_too_few_worms_have_the_same_total_variance(p: int, n: int, seed: int) -> None:
     drawn = draw(n, spread(dict.fromkeys(NAMES[:p], 0.1)), seed)
     assert drawn.var(axis=0, ddof=1).sum() == pytest.approx(p * 0.1**2)
-
-
-def test_many_draws_are_normal() -> None:
-    """Shares of a normal distribution; the hypercube keeps them within a few draws."""
-    drawn = draw(1000, spread({"young_modulus": 0.1, "spring_rate": 0.2}), 0)
-    for column, error in zip(drawn.T, (0.1, 0.2), strict=True):
-        levels = np.array([statistics.NormalDist(sigma=error).cdf(value) for value in np.sort(column)])
-        assert levels == pytest.approx((np.arange(1000) + 0.5) / 1000, abs=0.02)
 
 
 # The parameters

@@ -9,6 +9,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
+from itertools import product
 from multiprocessing import get_context
 from pathlib import Path
 from types import ModuleType
@@ -101,7 +102,7 @@ def controller_of(worm: str) -> Any:
 
 
 @COMPILER
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [pytest.param(seed, marks=[pytest.mark.slow] * (seed > 2)) for seed in range(100)])
 def test_a_network_gives_the_same_bits_where_sums_are_in_the_same_order(
     seed: int, benchmark: ModuleType, exactly: Callable[..., float], tmp_path: Path
 ) -> None:
@@ -111,8 +112,17 @@ def test_a_network_gives_the_same_bits_where_sums_are_in_the_same_order(
     assert benchmark.largest_difference(network, tmp_path, 500, scheme, ordered=False) < 1e-9
 
 
+FAST = (("linear", "double"), ("pressure", "float"), ("halves", "float"))
+
+
 @COMPILER
-@pytest.mark.parametrize(("worm", "real"), [("linear", "double"), ("pressure", "float"), ("halves", "float")])
+@pytest.mark.parametrize(
+    ("worm", "real"),
+    [
+        pytest.param(*case, marks=[] if case in FAST else [pytest.mark.slow])
+        for case in product(WORMS, ("double", "float"))
+    ],
+)
 def test_a_controller_passes_its_self_test(worm: str, real: Any, tmp_path: Path) -> None:
     done = compiled_self_test(controller_firmware(controller_of(worm), worm, real=real), tmp_path)
     assert done.returncode == 0, done.stdout
@@ -159,16 +169,6 @@ def test_a_controller_in_c_returns_what_it_returns_in_python(worm: str, tmp_path
         least, most = min(least, float(ours.min())), max(most, float(ours.max()))
     assert most - least > 0.2
     assert largest < 1e-9
-
-
-def test_a_small_full_network_is_dense_and_a_large_one_sparse() -> None:
-    full = Network("full")
-    for name in "ab":
-        full.add_neuron(name, Neuron())
-    for source, target in ("ab", "ba", "aa", "bb"):
-        full.add_synapse(source, target, Synapse(0.5, -40.0))
-    assert "a dense table" in network_firmware(full).header
-    assert "a sparse table" in network_firmware(peristalsis_network(6)).header
 
 
 def test_files_that_exist_are_kept(tmp_path: Path) -> None:
@@ -255,22 +255,3 @@ def test_the_papers_networks_give_the_same_bits_for_100_000_steps(
     network = controller_of(worm).circuit.network
     assert exactly(network, tmp_path, 100_000) == 0.0
     assert benchmark.largest_difference(network, tmp_path, 100_000, ordered=False) < 1e-8
-
-
-@pytest.mark.slow
-@COMPILER
-@pytest.mark.parametrize("seed", range(100))
-def test_random_networks_give_the_same_bits_for_100_000_steps(
-    seed: int, benchmark: ModuleType, exactly: Callable[..., float], tmp_path: Path
-) -> None:
-    network, scheme = benchmark.random_network(seed), ("euler", "toolbox", "heun")[seed % 3]
-    assert exactly(network, tmp_path, 100_000, scheme) == 0.0
-
-
-@pytest.mark.slow
-@COMPILER
-@pytest.mark.parametrize("real", ["double", "float"])
-@pytest.mark.parametrize("worm", WORMS)
-def test_every_controller_passes_its_self_test(worm: str, real: Any, tmp_path: Path) -> None:
-    done = compiled_self_test(controller_firmware(controller_of(worm), worm, real=real), tmp_path)
-    assert done.returncode == 0, done.stdout

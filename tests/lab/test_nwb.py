@@ -17,7 +17,7 @@ import pytest
 from annelid import load_config, simulate
 from annelid.control import NetworkController
 from annelid.errors import RunFileError
-from annelid.export import Selection, find_format, selected
+from annelid.export import FORMATS, Selection, selected
 from annelid.nervous import Network, Neuron, Synapse, persistent_sodium
 from annelid.simulation.runfile import Run
 from annelid_lab.nwb import UNITS
@@ -48,7 +48,7 @@ def named_run(tmp_path_factory: pytest.TempPathFactory) -> Run:
 
 @contextmanager
 def read(run: Run, target: Path) -> Iterator[Any]:
-    [path] = find_format("nwb").write(run, target.with_suffix(".nwb"), nothing)
+    [path] = FORMATS.find("nwb").write(run, target.with_suffix(".nwb"), nothing)
     assert pynwb.validate(path=str(path)) == []
     with pynwb.NWBHDF5IO(str(path), "r") as io:  # pyright: ignore[reportCallIssue]
         yield io.read()
@@ -136,8 +136,8 @@ def test_a_part_keeps_its_times(planar_run: Run, target: Path) -> None:
 
 def test_what_nwb_cannot_hold_is_refused(rods_run: Run, planar_run: Run, target: Path) -> None:
     with pytest.raises(RunFileError, match="qpos"):
-        find_format("nwb").write(selected(rods_run, Selection(["qpos"])), target.with_suffix(".nwb"), nothing)
+        FORMATS.find("nwb").write(selected(rods_run, Selection(["qpos"])), target.with_suffix(".nwb"), nothing)
     undated = replace(planar_run, data=planar_run.data.assign_attrs(created="yesterday"))
     with pytest.raises(RunFileError, match="created = 'yesterday'"):
-        find_format("nwb").write(undated, target.with_suffix(".nwb"), nothing)
+        FORMATS.find("nwb").write(undated, target.with_suffix(".nwb"), nothing)
     assert not target.with_suffix(".nwb").exists()

@@ -192,8 +192,6 @@ REFUSED = {
         {},
         "no actuator named ring_1; it has none",
     ),
-    "include": ('<mujoco><include file="/etc/passwd"/></mujoco>', {}, "write its content into the file"),
-    "plug-in": ('<mujoco><extension><plugin plugin="x"/></extension></mujoco>', {}, "plug-ins are code"),
     "busy engine": ('<mujoco><option iterations="1000000"/></mujoco>', {}, "at most 10000"),
 }
 

@@ -1,7 +1,6 @@
 """Networks as TOML and as Markdown."""
 
 import re
-from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
@@ -100,22 +99,17 @@ def test_faulty_texts_are_refused(subtests: pytest.Subtests) -> None:
         ("nam = 'x'", "unknown field 'nam': did you mean 'name'"),
         ("name = 3", "name must be a string"),
         ("neuron = 3", r"neuron must be an array of tables, \[\[neuron\]\]"),
-        ("neuron = [3]", "neuron 1 must be a table"),
         ("[[neuron]]\nrest_mV = 1.0", "neuron 1: name is missing"),
         ("[[neuron]]\nname = 'a'\nrest = 1.0", r"neuron 1 \('a'\): unknown field 'rest': did you mean 'rest_mV'"),
         ("[[neuron]]\nname = 'a'\nrest_mV = true", "rest_mV must be a number, not True"),
         ("[[neuron]]\nname = 'a'\ncapacitance_nF = -1", r"neuron 1 \('a'\): .*capacitance_nF must be positive"),
-        ("[[neuron]]\nname = 'a'\nchannels = 1", "channels must be an array of tables"),
         ("[[neuron]]\nname = 'a'\nfiring = 1", "firing has been removed"),
-        ("[[neuron]]\nname = 'a'\n[[neuron.channels]]\nreversal_mV = 1", "conductance_uS is missing"),
         ("[[neuron]]\nname = 'a'\n[[neuron]]\nname = 'a'", "'a' exists already"),
         ("[[connection]]\nsource = 'a'\ntarget = 'a'\nkind = 'synaps'", "did you mean 'synapse'"),
         ("[[connection]]\nsource = 'a'\ntarget = 'a'\nkind = 'synapse'", "conductance_uS is missing"),
         ("[[connection]]\nsource = 'a'\ntarget = 'a'\nkind = 'spiking_synapse'", "has been removed"),
         ("[[input]]\nname = 'i'\ntargets = 'a'", "targets must be a list of names"),
         ("[[input]]\nname = 'i'\ntargets = ['b']", "unknown neuron 'b'"),
-        ("[[output]]\nname = 'o'", "output 1 .'o'.: source is missing"),
-        ("[[output]]\nname = 'o'\nsource = 'a'\nunit = 'mV'", "unknown field 'unit'"),
         (
             "[[neuron]]\nname = 'a'\n[[connection]]\nsource = 'a'\ntarget = 'a'\nkind = 'gap_junction'\n"
             "conductance_uS = 1.0\nrectified = 1",
@@ -151,9 +145,3 @@ def test_table_lists_all_with_units_and_escapes_bars():
     for line in table.splitlines():
         if line.startswith("|"):
             assert len(re.findall(r"(?<!\\)\|", line)) in {3, 7, 8}
-
-
-def test_a_changed_neuron_shows_in_the_table():
-    network = Network()
-    network.add_neuron("a", replace(Neuron(), bias_nA=3.5))
-    assert "| a | 5 | 1 | 0 | 3.5 | 0 |  |" in network.table()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import json
-import os
 import re
 import subprocess
 import sys
@@ -159,22 +158,6 @@ def test_an_error_names_what_is_wrong_as_text() -> None:
     hostile = HOSTILE.replace("\x00", "")
     for words in (["show", hostile], [hostile], ["run", f"--{hostile}"], ["run", "--set", f"{hostile}=1"]):
         assert annelid(*words, code=2)
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pseudo-terminals")
-def test_a_terminal_gets_no_commands(tmp_path: Path) -> None:
-    import pty
-
-    there, here = pty.openpty()
-    words = [sys.executable, "-m", "annelid", "show", f"{tmp_path}/{''.join(COMMANDS).replace(chr(0), '')}"]
-    done = subprocess.run(words, stdout=here, stderr=here, env={**os.environ, "TERM": "dumb"}, check=False, timeout=120)
-    os.close(here)
-    said = os.read(there, 100_000).decode()
-    os.close(there)
-    assert done.returncode == 2
-    assert "there is no run file" in said
-    assert "\\u001b[2J" in said
-    assert CONTROL.search(said.replace("\r\n", "\n")) is None
 
 
 def test_errors_and_warnings_of_the_library_are_text() -> None:

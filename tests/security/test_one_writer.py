@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import signal
 import subprocess
@@ -44,7 +43,7 @@ def test_the_other_is_told_who_writes_and_changes_nothing(tmp_path: Path) -> Non
     folder = tmp_path / "deep" / "run"
     process = holder(folder, "sys.stdin.readline()")
     before = {entry: entry.stat().st_mtime_ns for entry in folder.iterdir()}
-    with pytest.raises(RunFileError, match=rf"process {process.pid} \(since 20\d\d-.*: -c\) writes into the folder"):
+    with pytest.raises(RunFileError, match=rf"process {process.pid} writes into the folder"):
         simulate(load_config(PLANAR, {"duration_s": 0.05}), folder, overwrite=True)
     for words in (["run", PLANAR, "-o"], ["calibrate", "-o"], ["study", "bench", "-o"]):
         done = CliRunner().invoke(app, [*words, str(folder)])
@@ -67,7 +66,6 @@ def test_a_lock_ends_with_its_process(tmp_path: Path) -> None:
 def test_the_same_thread_may_lock_again_and_no_other(tmp_path: Path) -> None:
     with locked(tmp_path), locked(tmp_path / "." / "a" / ".."), locked(tmp_path):
         assert f"process {os.getpid()}" in refusal_of(tmp_path)
-        assert json.loads((tmp_path / LOCK_NAME).read_text())["pid"] == os.getpid()
     assert list(tmp_path.iterdir()) == []
 
 
@@ -106,9 +104,7 @@ def test_a_lock_file_is_never_written_through(tmp_path: Path) -> None:
 
 def test_what_a_lock_file_says_cannot_steer_the_terminal(tmp_path: Path) -> None:
     with locked(tmp_path):
-        one = '{"pid": 1, "since": "\\u001b[2J", "command": "a\\nb"}'
-        endless = f'{{"pid": 1e400, "since": "", "command": "{"x" * 3000}"}}'
-        for text in (one, endless, "[" * 4000, "\x1b[2J", '{"pid": "x"}'):
+        for text in ("[" * 4000, "\x1b[2J", " 1\x1b[2J", "", " 999999999999999999999"):
             (tmp_path / LOCK_NAME).write_text(text)
             sentence = refusal_of(tmp_path)
             assert "writes into the folder" in sentence
@@ -132,7 +128,7 @@ def test_of_two_runs_into_one_folder_one_is_there_whole_and_the_other_is_told(tm
     assert sorted(codes.values()) == [0, 2], (codes, out)
     winner, loser = (1, 2) if codes[1] == 0 else (2, 1)
     pid = (first if winner == 1 else second).pid
-    assert f"process {pid} (since 20" in out[loser][1], out
+    assert f"process {pid} writes" in out[loser][1], out
     assert len(out[loser][1].splitlines()) == 1
     run = open_run(folder)
     assert (run.config.seed, run.status) == (winner, "complete")

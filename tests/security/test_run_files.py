@@ -127,21 +127,6 @@ def test_what_no_run_file_holds_is_refused_before_it_is_read(subtests: pytest.Su
                 assert "\n" not in str(caught.value)
 
 
-def test_commands_tell_of_what_no_run_file_holds_in_a_sentence(run: Run, folder: Path) -> None:
-    path = changed(run, folder / "run.nc", of_other_bytes)
-    before = sorted(folder.iterdir())
-    for arguments in (["export", path, "--to", "csv", "-o", "csv"], ["show", path], ["draw", path, "-o", "a.png"]):
-        done = CliRunner().invoke(app, [str(argument) for argument in arguments])
-        assert done.exit_code == 2, done.output
-        assert len(done.stderr.splitlines()) == 1
-    assert sorted(folder.iterdir()) == before
-
-
-def in_variables(file: h5py.File) -> None:
-    for i in range(100):
-        file.create_dataset(f"v{i}", (), h5py.string_dtype())[()] = f"{i:077}"
-
-
 def in_attributes(file: h5py.File) -> None:
     for i in range(100):
         file["samples_written"].attrs[f"a{i}"] = f"{i:077}"
@@ -159,7 +144,6 @@ BOOKKEEPING = ("samples_written", "frames_written", "status_code", "status_messa
 @pytest.mark.parametrize(
     ("write", "says"),
     [
-        (in_variables, "are longer than the file"),
         (in_attributes, "are longer than the file"),
         (in_lists, "not one text"),
     ],

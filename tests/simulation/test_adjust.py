@@ -85,14 +85,6 @@ def test_a_worm_under_trial_goes_on_from_where_it_is() -> None:
     assert all(np.array_equal(states[0][name], states[1][name]) for name in states[0] | states[1])
 
 
-def test_noise_changed_live_reaches_the_controller() -> None:
-    before = load_config("riddle2023-rods")
-    after = load_config("riddle2023-rods", {"sensor.noise_m": 0.005})
-    live = adjusted(running(before), before, after)
-    noise = live.observed().stretch_m - live.sensation.stretch_m
-    assert 0.001 < noise.std() < 0.02
-
-
 def test_another_body_is_refused_and_nothing_changes() -> None:
     before = load_config("riddle2023-rods")
     simulation = running(before)

@@ -59,26 +59,6 @@ def test_a_file_of_annelid_0_1_is_read(tmp_path: Path) -> None:
     assert "older version" in verify_run(tmp_path / "run.nc")
 
 
-def test_the_name_decided_what_is_published_up_to_schema_1(subtests: pytest.Subtests) -> None:
-    for name, published in (
-        ("riddle2023", "riddle2023"),
-        ("riddle2023-rods", "riddle2023"),
-        ("wang", "wang"),
-        ("wang-2", None),
-        ("riddle2022-planar", "riddle2022"),
-        ("riddle2025", None),
-        ("mine", None),
-    ):
-        with subtests.test(f"{name!r:.60}"):
-            tree = load_config({"name": name}).model_dump(mode="json")
-            assert tree.pop("published") is None
-            for schema in (0, 1):
-                old = xarray.Dataset(attrs={"schema_version": schema, "config": json.dumps(tree)})
-                assert RunConfig.model_validate_json(migrated(old).attrs["config"]).published == published
-            new = xarray.Dataset(attrs={"schema_version": 2, "config": json.dumps(tree)})
-            assert migrated(new).attrs["config"] == json.dumps(tree)
-
-
 PRESSURE = {"body": {"kind": "worm"}, "controller": {"kind": "sns-pressure"}}
 RODS = {"extends": "riddle2023-rods"}
 ROBUST = {**RODS, "controller": {"kind": "sns-robust", "motor_time_constant_s": 0.2}}

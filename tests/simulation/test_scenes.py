@@ -5,14 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import mujoco
 import numpy as np
 import pytest
 from PIL import Image
 
 from annelid import RunConfig, load_config, simulate
 from annelid.body import build_spec
-from annelid.body.assemble import mjcf_text
 from annelid.draw.drawn_worm import DrawnWorm
 from annelid.errors import ConfigError
 from annelid.simulation import Run
@@ -99,21 +97,6 @@ def test_a_thing_on_a_spring_sinks_by_weight_over_stiffness_and_its_energy_close
     assert lost == pytest.approx(0.5 * 40 * sunk**2, rel=0.1)
     missing = (total_J(plant) - start) - (total_J(bare) - bare_start)
     assert abs(missing) < 0.1 * lost
-
-
-def test_a_falling_tumbling_thing_turns_potential_into_kinetic_energy() -> None:
-    """Free fall over n steps is g h^2 n (n + 1) / 2; the energy of turning stays, but for the step's error."""
-    plant = plant_in('<body pos="-2 0 9"><freejoint/><geom type="box" size="0.1 0.2 0.05" mass="0.5"/></body>')
-    first = int(plant.model.jnt_dofadr[-1])
-    plant.data.qvel[first + 3 : first + 6] = [3.0, 1.0, 2.0]
-    turning = 0.5 * float(plant.model.body("scene/object_1").inertia @ [9.0, 1.0, 4.0])
-    bare = moved(plant_in(""), 0.25)
-    moved(plant, 0.25)
-    n = round(0.25 / STEP_S)
-    fallen = 9.81 * STEP_S**2 * n * (n + 1) / 2
-    assert plant.posture.objects[0, 2] == pytest.approx(8.991 - fallen, abs=1e-9)
-    gained = plant.kinetic_energy_J() - bare.kinetic_energy_J()
-    assert gained == pytest.approx(turning + 0.5 * 0.5 * (9.81 * n * STEP_S) ** 2, rel=1e-3)
 
 
 SLAB = '<body name="slab" pos="0.4 0 0.02"><freejoint/><geom type="box" size="1.5 0.6 0.02" mass="2"/></body>'
@@ -230,11 +213,6 @@ def test_a_picture_is_a_height_field_with_white_high_and_its_first_row_to_the_le
     height = model.hfield_data.reshape(3, 4)
     assert height[2, 3] == 1.0
     assert height.sum() == 1.0
-
-
-def test_a_scene_is_written_for_plain_mujoco() -> None:
-    model = mujoco.MjModel.from_xml_string(mjcf_text(config(BOX)))
-    assert model.body("scene/box").mass[0] == pytest.approx(0.03)
 
 
 def test_a_binary_mesh_and_a_text_give_the_same_ground(tmp_path: Path) -> None:

@@ -118,12 +118,6 @@ def test_a_worm_that_clings_loses_next_to_nothing() -> None:
     assert np.abs(end["slip_speed"]).max() < 0.01
 
 
-def test_a_weightless_worm_touches_nothing() -> None:
-    end = numbers(resting("rods", 0.05, **{"arena.gravity_m_per_s2": 0.0}))
-    for name in ("touch", "contact_count", "slip_speed", "slip_distance", "slip_loss"):
-        assert not end[name].any(), name
-
-
 def test_the_count_is_that_of_the_engine_s_contacts() -> None:
     plant = resting("rods")
     mujoco.mj_forward(plant.model, plant.data)

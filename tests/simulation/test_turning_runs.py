@@ -10,7 +10,6 @@ import pytest
 from small_robot import assert_equal, small_config
 
 from annelid import load_config, open_run, simulate
-from annelid.analysis import summary
 from annelid.analysis.track import track_of
 from annelid.protocols import SIDES
 from annelid_studies.turning import COUNTER, turn_of
@@ -74,27 +73,6 @@ def test_opposite_modulations_turn_to_opposite_sides(tmp_path: Path) -> None:
     right, left = turns
     assert right.curvature_per_m < -0.1
     assert left.curvature_per_m > 0.1
-
-
-@pytest.mark.slow
-def test_a_round_worm_rolls_where_one_side_is_weaker_whatever_the_step(tmp_path: Path) -> None:
-    turning = {"kind": "constant", "modulation": -0.9}
-    for step_s, roll_deg in ((0.02, -128.3), (0.01, -94.9)):
-        steps = {"clock.physics_timestep_s": step_s, "record.signals_interval_s": 0.02}
-        config = load_config("riddle2025-3x1", {"turning": turning, "duration_s": 8.0, **steps})
-        rolled = track_of(simulate(config, tmp_path / f"{step_s}", progress=False)).roll_rad[-1]
-        assert np.degrees(rolled) == pytest.approx(roll_deg, abs=5.0), "the side that shortens ends below"
-
-
-@pytest.mark.slow
-def test_the_nervous_system_steers_the_worm_to_a_heading(tmp_path: Path) -> None:
-    turning = {"kind": "heading", "heading_deg": 30.0, "shares": list(COUNTER)}
-    own = {"body.rings.layout": "halves", "sensor.tolerance_m": 0.008, "duration_s": 20.0, "turning": turning}
-    run = simulate(load_config("riddle2025-muscles", own), tmp_path / "run", progress=False)
-    assert summary(run).wave
-    track = track_of(run)
-    last_cycles = track.heading_rad[track.time_s > 14.0]
-    assert np.degrees(last_cycles.mean()) == pytest.approx(30.0, abs=6.0)
 
 
 def test_the_touch_of_the_floor_alone_turns_nobody(tmp_path: Path) -> None:

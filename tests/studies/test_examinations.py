@@ -22,8 +22,7 @@ from annelid_studies.riddle2023.examinations import EXAMINATIONS, timestep
 from annelid_studies.riddle2023.examinations.design import RIGID, held_elongation
 from annelid_studies.riddle2023.examinations.discretization import convergence_order
 from annelid_studies.riddle2023.examinations.friction import FRICTION
-from annelid_studies.riddle2023.examinations.gate import FLAT, GATE, STARTS, read_beat, variant
-from annelid_studies.riddle2023.examinations.noise import MAPS, handled_noise, is_even, share
+from annelid_studies.riddle2023.examinations.noise import MAPS, handled_noise, is_even
 from annelid_studies.riddle2023.examinations.noise import steady_tolerances as steady
 from annelid_studies.riddle2023.examinations.pins import tie_stiffness_N_per_m
 from annelid_studies.riddle2023.examinations.ranges import EQUAL, RANGES, compiled_ranges
@@ -34,7 +33,7 @@ pytestmark = pytest.mark.usefixtures("runs_in_this_process")
 
 LIMP = replace(WAVE, regularity=0.6)
 BACKWARDS = replace(WAVE, direction=-1)
-OF_OUTCOMES = [one for one in EXAMINATIONS if one.name not in ("gate", "timestep")]
+OF_OUTCOMES = [one for one in EXAMINATIONS if one.name != "timestep"]
 """Examinations that read no run but what is known of it."""
 
 
@@ -145,10 +144,6 @@ def test_a_tolerance_is_steady_if_every_run_walks() -> None:
     assert handled_noise({(0.01, 0.0): [SILENT]}) is None
 
 
-def test_another_wave_does_not_walk() -> None:
-    assert share({(0.01, 0.0): [BACKWARDS], (0.02, 0.0): [WAVE, LIMP, SILENT, SILENT]}) == pytest.approx(0.25)
-
-
 def test_the_velocity_limit_is_that_of_the_papers_muscle() -> None:
     # 1.5 optimal lengths of (1.052 - 0.548) / 0.3 = 1.68 m a second.
     assert velocity_limit(load_config(CHAIN)) == pytest.approx(2.52)
@@ -189,19 +184,3 @@ def test_the_time_step_is_examined_in_the_quick_effort(short: Outcome, monkeypat
     findings = timestep.TIMESTEP.examine(made, "quick")
     assert findings.numbers["times_velocity_limit_chain_1ms"] == pytest.approx(1.5)
     assert "1.5, 1.5 and 1.5 times as far in the paper's chain" in findings.answer
-
-
-def test_the_planar_worms_gates(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    import annelid_studies.riddle2023.examinations.gate as gate
-
-    pairs = (("toolbox", "euler"), ("toolbox", "toolbox"), ("steady", "euler"))
-    monkeypatch.setattr(gate, "VARIANTS", {"quick": {FLAT: pairs}})
-    store = Store(tmp_path)
-    store.compute(GATE.cases("quick"))
-    findings = GATE.examine(store, "quick")
-    # Measured independently on the authors' network: forward Euler, and SNS-Toolbox's order.
-    periods = [float(row[findings.table.header.index("period (s)")]) for row in findings.table.rows]
-    assert periods[:2] == [pytest.approx(2.625, abs=0.001), pytest.approx(2.631, abs=0.001)]
-    cases = {start: variant(FLAT, start, "euler") for start in STARTS}
-    long, short = (read_beat(FLAT, start, "euler", store[case]).first_s for start, case in cases.items())
-    assert long > 5 * short

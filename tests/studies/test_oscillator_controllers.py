@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -24,12 +23,10 @@ from annelid_studies.oscillators.controllers import HeteroclinicChannel, PhaseCh
 KINDS = ("sine", "timed", "shc", "phase-chain")
 
 
-def at(time_s: float, n: int = 3, longer_m: Any = 0.0, load_N: Any = 0.0) -> Sensation:
+def at(time_s: float, n: int = 3, longer_m: Any = 0.0) -> Sensation:
     rest = np.full((n, 2), 0.1)
     stretch = rest + np.broadcast_to(longer_m, n)[:, np.newaxis]
-    contact = np.zeros((n, 3))
-    contact[:, 2] = load_N
-    return Sensation(time_s, stretch, rest, np.ones(n), np.zeros(n), contact, np.zeros(3))
+    return Sensation(time_s, stretch, rest, np.ones(n), np.zeros(n), np.zeros((n, 3)), np.zeros(3))
 
 
 def built(kind: str, n_segments: int = 3, n_muscles: int | None = None) -> Controller:
@@ -167,25 +164,16 @@ def test_stretch_of_the_present_segment_ends_its_dwell() -> None:
     assert (alone - reached) * 1e-3 == pytest.approx(expected, rel=0.1)
 
 
-def test_contact_of_the_segment_before_ends_the_dwell() -> None:
-    one = HeteroclinicController(HeteroclinicChannel(noise=0.0, feedback="contact", contact_cue_N=0.2), 3, 3, 0.001)
-    alone = steps_at_first_node(one, load_N=0.1)
-    assert steps_at_first_node(one, load_N=[0.0, 0.0, 0.3]) < 0.6 * alone
-    assert steps_at_first_node(one, load_N=[0.3, 0.3, 0.0]) == alone
-
-
 def test_a_gain_that_can_silence_the_channel_is_refused() -> None:
-    for feedback in ("stretch", "contact"):
-        with pytest.raises(ConfigError, match=r"feedback_gain_per_s = 1\.01: must be less than 1, or"):
-            HeteroclinicController(HeteroclinicChannel(feedback=feedback, feedback_gain_per_s=1.01), 3, 3, 0.001)
-    HeteroclinicController(HeteroclinicChannel(feedback="none", feedback_gain_per_s=1.01), 3, 3, 0.001)
+    with pytest.raises(ConfigError, match=r"feedback_gain_per_s = 1\.01: must be less than 1, or"):
+        HeteroclinicController(HeteroclinicChannel(feedback_gain_per_s=1.01), 3, 3, 0.001)
 
 
 def test_a_bad_section_is_refused_in_one_sentence(subtests: pytest.Subtests) -> None:
     for controller, sentence in (
-        ({"kind": "shc", "noise": 0, "bias_per_s": 0, "feedback": "none"}, "would rest at its first node"),
+        ({"kind": "shc", "noise": 0, "bias_per_s": 0, "feedback_gain_per_s": 0}, "would rest at its first node"),
         ({"kind": "shc", "saddle_value": 1.0}, r"controller\.saddle_value = 1\.0: must be greater than 1"),
-        ({"kind": "shc", "feedback": "contact"}, "no effect on body.kind = 'riddle2022', which touches no ground"),
+        ({"kind": "shc", "feedback": "contact"}, "controller.feedback.*always waits for the stretch"),
         ({"kind": "adaptive", "drive": 1.2}, r"controller\.drive = 1\.2: must be at most 1"),
         ({"kind": "adaptive", "network": {"tau": 3}}, r"unknown field 'controller\.network\.tau'"),
         ({"kind": "phase-chain", "rive": 3}, "did you mean 'drive'"),
@@ -217,17 +205,7 @@ def test_a_planar_worm_contracts_in_order(kind: str, tmp_path: Path) -> None:
 
 
 def test_noise_is_continued_bit_for_bit(tmp_path: Path) -> None:
-    noisy = {"noise": 1e-3, "bias_per_s": 0.0, "feedback": "none"}
+    noisy = {"noise": 1e-3, "bias_per_s": 0.0, "feedback_gain_per_s": 0.0}
     whole = simulate(planar("shc", 1.0, **noisy), tmp_path / "3", progress=False)
     first = simulate(planar("shc", 0.4, **noisy), tmp_path / "1", progress=False)
     joined_equal(first, simulate(planar("shc", 1.0, **noisy), tmp_path / "2", resume=first, progress=False), whole)
-
-
-def test_contact_cue_is_the_size_of_the_force_on_the_segment_before() -> None:
-    config = load_config("riddle2023-rods", {"controller": {"kind": "shc", "feedback": "contact"}})
-    assert isinstance(config.controller, HeteroclinicChannel)
-    felt = replace(at(0.0), contact_force_N=np.array([[0.0, 0, 0], [0, 0, 0], [0.15, 0, 0.15]]))
-    one = HeteroclinicController(config.controller, 3, 3, 0.001)
-    one.step(felt)
-    # The size of the force counts, 0.21 N of the third segment, which is the one before the first in the ring.
-    assert np.asarray(one.read(frame=False)["cue_on"]).tolist() == [1.0, 0.0, 0.0]

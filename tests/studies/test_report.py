@@ -188,14 +188,7 @@ def test_links_of_the_page_have_their_target(html: Reading) -> None:
 
 def test_a_part_of_the_report_has_no_empty_headings(report: Report, tmp_path: Path) -> None:
     text = write_report(replace(report, figures=(), claims=(), examinations=()), tmp_path / "new").read_text("utf-8")
-    assert Reading(text).texts["h2"] == ["Main numbers", "How to reproduce"]
-
-
-def test_a_part_of_the_report_tells_its_own_command(report: Report, tmp_path: Path) -> None:
-    part = replace(report, figures=(), claims=(), examinations=report.examinations[:2])
-    commands = Reading(write_report(part, tmp_path).read_text(encoding="utf-8")).texts["code"]
-    assert "annelid paper -o report --only pins --only springs" in commands
-    assert "annelid paper -o report" not in commands
+    assert Reading(text).texts["h2"] == ["Main numbers"]
 
 
 def test_the_page_of_claims(report: Report) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from annelid.analysis.rhythm import RhythmScore
-from annelid.errors import ConfigError, RunFileError
+from annelid.errors import ConfigError
 from annelid.plausibility import tolerance_window_m
 from annelid_studies import robustness as study
 from annelid_studies.robustness import CONTROLLERS, Judged, judge, points, shares
@@ -79,8 +79,8 @@ def test_a_run_that_a_guard_stopped_did_not_walk() -> None:
 
 
 def test_shares_count_by_controller() -> None:
-    judged = [Judged(i, "sns", 3, "", None, i < 3, i < 2, i != 1, "") for i in range(4)]
-    judged += [Judged(0, "sns-robust", 3, "", None, True, True, True, "")]
+    judged = [Judged(i, "sns", 3, "", None, i < 3, i < 2, i != 1) for i in range(4)]
+    judged += [Judged(0, "sns-robust", 3, "", None, True, True, True)]
     found = shares(judged)
     assert [found["sns"][name] for name in ("points", "walked", "in_time", "lengthened")] == [4, 3, 2, 1]
     assert found["sns"]["share"] == 0.5
@@ -90,7 +90,7 @@ def test_shares_count_by_controller() -> None:
 def test_the_interval_holds_the_shares_that_a_score_test_accepts(subtests: pytest.Subtests) -> None:
     for successes, n in ((0, 10), (7, 10), (10, 10), (285, 300)):
         with subtests.test(f"{successes!r:.60}"):
-            judged = [Judged(i, "sns", 3, "", None, True, i < successes, True, "") for i in range(n)]
+            judged = [Judged(i, "sns", 3, "", None, True, i < successes, True) for i in range(n)]
             low, high = shares(judged)["sns"]["interval"]
             for share in (low, high):
                 if 1e-9 < share < 1.0 - 1e-9:
@@ -129,37 +129,15 @@ def test_the_study_keeps_its_results_and_goes_on(tmp_path: Path) -> None:
     assert content["shares"]["sns"]["in_time"] == 0
 
 
-@pytest.mark.usefixtures("short")
-def test_points_that_other_code_ran_are_kept_only_when_asked(tmp_path: Path) -> None:
-    study.robustness(tmp_path, 1, controllers=["sns"])
-    path = tmp_path / "robustness.json"
-    content = json.loads(path.read_text())
-    content["judged"][0] |= {"code": "older", "reason": "as it was"}
-    path.write_text(json.dumps(content))
-    [kept] = study.robustness(tmp_path, 1, controllers=["sns"], keep=True)
-    assert kept.reason == "as it was"
-    path.write_text(json.dumps(content))
-    [again] = study.robustness(tmp_path, 1, controllers=["sns"])
-    assert again.reason != "as it was"
-
-
-def test_damaged_results_are_refused(tmp_path: Path) -> None:
-    (tmp_path / "robustness.json").write_text('{"judged": [{"point": 1}]}')
-    with pytest.raises(RunFileError, match=r"robustness\.json is not what"):
-        study.robustness(tmp_path, 1)
-
-
 def test_an_unknown_controller_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="unknown controller 'shc'"):
         study.robustness(tmp_path, 1, controllers=["shc"])
 
 
-def test_the_committed_results_are_of_the_sample_and_can_be_continued(tmp_path: Path) -> None:
+def test_the_committed_results_are_of_the_sample() -> None:
     results = Path(__file__).parents[2] / "docs" / "results" / "robustness_three_segments.json"
-    (tmp_path / "robustness.json").write_bytes(results.read_bytes())
-    judged = study.read_judged(tmp_path)
-    assert judged
-    assert len({(one.controller, one.point) for one in judged}) == len(judged)
+    judged = json.loads(results.read_text(encoding="utf-8"))["judged"]
+    assert len({(one["controller"], one["point"]) for one in judged}) == len(judged) > 0
     for one in judged:
-        assert one.n_segments == 3
-        assert one.walked or not one.in_time
+        assert one["n_segments"] == 3
+        assert one["walked"] or not one["in_time"]

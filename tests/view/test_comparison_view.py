@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.table import Table
 
 from annelid.analysis.comparison import compare
+from annelid.draw.canvas import segment_colors
 from annelid.draw.figures.comparison import lengths_figure, potentials_figure, travel_figure
 from annelid.draw.summary_table import comparison_table, fields_table
 from annelid.errors import RunFileError
@@ -40,17 +41,14 @@ def test_the_fields_of_other_kinds_are_left_to_json(planar_run: Run, rods_run: R
     assert "--json lists all" in text
 
 
-@pytest.mark.parametrize("draw", [lengths_figure, potentials_figure, travel_figure])
-def test_every_run_gets_its_colour(draw, planar_run: Run, rods_run: Run, tmp_path: Path) -> None:
-    from annelid.draw.canvas import segment_colors
-
-    both = draw([planar_run, rods_run], ("planar", "rods"), tmp_path / "both.png")
-    with Image.open(both) as image:
-        colors = {pixel for _, pixel in image.convert("RGB").getcolors(image.width * image.height) or ()}
-    drawn = [tuple(int(color[i : i + 2], 16) for i in (1, 3, 5)) for color in segment_colors(2)]
-    assert drawn[1] in colors
-    # A kinematic worm goes nowhere, and is not in the legend either.
-    assert (drawn[0] in colors) == (draw is not travel_figure)
+def test_every_run_gets_its_colour(planar_run: Run, rods_run: Run, tmp_path: Path) -> None:
+    for draw in (lengths_figure, potentials_figure, travel_figure):
+        with Image.open(draw([planar_run, rods_run], ("planar", "rods"), tmp_path / "both.png")) as image:
+            colors = {pixel for _, pixel in image.convert("RGB").getcolors(image.width * image.height) or ()}
+        drawn = [tuple(int(color[i : i + 2], 16) for i in (1, 3, 5)) for color in segment_colors(2)]
+        assert drawn[1] in colors
+        # A kinematic worm goes nowhere, and is not in the legend either.
+        assert (drawn[0] in colors) == (draw is not travel_figure)
 
 
 def test_worms_that_go_nowhere_have_no_travel_to_draw(planar_run: Run, tmp_path: Path) -> None:

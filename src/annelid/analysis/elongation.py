@@ -16,40 +16,25 @@ class Elongation:
     """How far segments elongate."""
 
     elongation_first_helix_pp_m: list[float | None] | None = number(
-        "elongation on the first helix, peak to peak", "elongation, first helix, pp", 100.0, 2, "cm", per_segment=True
+        "elongation on the first helix, peak to peak", "elongation, first helix, pp", "cm", per_segment=True
     )
     elongation_least_pp_m: list[float | None] | None = number(
-        "peak to peak of the sensor with which it is least",
-        "elongation, least sensor, pp",
-        100.0,
-        2,
-        "cm",
-        per_segment=True,
+        "peak to peak of the sensor with which it is least", "elongation, least sensor, pp", "cm", per_segment=True
     )
     elongation_most_pp_m: list[float | None] | None = number(
-        "peak to peak of the sensor with which it is most",
-        "elongation, most sensor, pp",
-        100.0,
-        2,
-        "cm",
-        per_segment=True,
+        "peak to peak of the sensor with which it is most", "elongation, most sensor, pp", "cm", per_segment=True
     )
     elongation_mean_max_m: list[float | None] | None = number(
-        "largest mean of the segment's sensors above rest",
-        "elongation, mean, maximum",
-        100.0,
-        2,
-        "cm",
-        per_segment=True,
+        "largest mean of the segment's sensors above rest", "elongation, mean, maximum", "cm", per_segment=True
     )
     middle_deficit: float | None = number(
-        "interior segments below the first, on the first helix", "middle below first, pp", 100.0, 1, "%"
+        "interior segments below the first, on the first helix", "middle below first, pp", "%"
     )
     middle_deficit_mean: float | None = number(
-        "interior segments below the first, mean of the sensors", "middle below first, mean", 100.0, 1, "%"
+        "interior segments below the first, mean of the sensors", "middle below first, mean", "%"
     )
     end_difference: float | None = number(
-        "last segment below the first, on the first helix", "last below first, pp", 100.0, 1, "%"
+        "last segment below the first, on the first helix", "last below first, pp", "%"
     )
 
 

@@ -19,12 +19,12 @@ class Energy:
     """
 
     energy_muscle_work_J: float | None = number(
-        "net work of all muscles in the whole run", "muscles' net work, whole run", 1.0, 2, "J"
+        "net work of all muscles in the whole run", "muscles' net work, whole run", "J"
     )
     energy_kinetic_J: float | None = number("gain of kinetic energy")
     energy_elastic_J: float | None = number("gain of the energy of strands and springs")
     energy_potential_J: float | None = number("gain of the energy of the weight")
-    energy_slip_J: float | None = number("lost to friction of what slides", "lost to slip, whole run", 1.0, 2, "J")
+    energy_slip_J: float | None = number("lost to friction of what slides", "lost to slip, whole run", "J")
     energy_constraints_J: float | None = number(
         "lost to contacts along their normal and to other constraints; soft contacts may give back"
     )

@@ -30,30 +30,24 @@ class Gait:
     )
     gait_period_s: float | None = number("mean duration of these cycles")
     speed_m_per_s: float | None = number(
-        "travel of the centre of mass towards the front over time, negative backwards", "speed", 100.0, 2, "cm/s"
+        "travel of the centre of mass towards the front over time, negative backwards", "speed", "cm/s"
     )
     speed_body_lengths_per_s: float | None = number(
-        "the same over the length of the body at rest", "speed in body lengths", 1.0, 3, "body lengths/s"
+        "the same over the length of the body at rest", "speed in body lengths", "body lengths/s"
     )
-    stride_m: float | None = number("travel towards the front per cycle", "stride", 100.0, 1, "cm")
+    stride_m: float | None = number("travel towards the front per cycle", "stride", "cm", digits=1)
     stride_body_lengths: float | None = number(
-        "the same over the length of the body at rest", "stride in body lengths", 1.0, 3, "body lengths"
+        "the same over the length of the body at rest", "stride in body lengths", "body lengths"
     )
     contact_duty: list[float] | None = number(
-        "share of the time in which the segment touches the ground", "on the ground", 100.0, 0, "%", per_segment=True
+        "share of the time in which the segment touches the ground", "on the ground", "%", digits=0, per_segment=True
     )
     slip_ratio: float | None = number(
-        "sliding distance on the ground, mean of the segments, over the path of the centre of mass",
-        "slip ratio",
-        100.0,
-        1,
-        "%",
+        "sliding distance on the ground, mean of the segments, over the path of the centre of mass", "slip ratio", "%"
     )
     backward_ratio: float | None = number(
         "travel of the centre of mass away from the front over that towards it; no measure of slip",
         "travel backwards",
-        100.0,
-        1,
         "%",
     )
     cost_of_transport: float | None = number(
@@ -68,11 +62,7 @@ class Gait:
         "force times half of every change of length, over weight times path"
     )
     lateral_drift: float | None = number(
-        "travel sideways per travel towards the front, positive to the left",
-        "drift to the left per travel",
-        100.0,
-        1,
-        "%",
+        "travel sideways per travel towards the front, positive to the left", "drift to the left per travel", "%"
     )
     heading_change_rad: float | None = number(
         "change of the heading from the first cycle to the last, positive to the left"
@@ -80,9 +70,8 @@ class Gait:
     turning_radius_m: float | None = number(
         "radius of the circle through the track, positive to the left; none for a straight one",
         "turning radius, left positive",
-        1.0,
-        2,
         "m",
+        digits=2,
     )
 
     if not TYPE_CHECKING:

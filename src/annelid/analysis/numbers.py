@@ -16,6 +16,8 @@ from numpy.typing import ArrayLike
 
 from annelid.config import unit_of
 
+_SHOWN = {"%": (100.0, 1), "cm": (100.0, 2), "cm/s": (100.0, 2), "mm": (1000.0, 1), "N": (1.0, 2), "J": (1.0, 2)}
+"""What tables multiply a number by to show it in a unit, and digits behind the point; elsewhere 1 and 3."""
 UNKNOWN = "-"
 """Printed where a run does not have a number."""
 
@@ -32,9 +34,8 @@ class Number:
         section: Class of the record's section that has it.
         meaning: What it is, in a line.
         label: What a table calls it; empty where no table shows it.
-        factor: What a table multiplies it by.
-        digits: Digits behind the point in a table.
         shown_unit: Unit in a table.
+        digits: Digits behind the point in a table.
         per_segment: Whether there is one for each segment.
         in_sweeps: Whether a sweep may output it.
     """
@@ -43,9 +44,8 @@ class Number:
     section: type
     meaning: str
     label: str
-    factor: float
-    digits: int
     shown_unit: str
+    digits: int
     per_segment: bool
     in_sweeps: bool
 
@@ -53,6 +53,11 @@ class Number:
     def unit(self) -> str:
         """Unit that ends its name; "1" for a share or a count."""
         return unit_of(self.name) or "1"
+
+    @property
+    def factor(self) -> float:
+        """What a table multiplies it by."""
+        return _SHOWN.get(self.shown_unit, (1.0, 3))[0]
 
     def text(self, value: Value) -> str:
         """Writes a value of it, or one for each segment, as tables do; a dash for None."""
@@ -71,10 +76,9 @@ class Number:
 def number(
     meaning: str,
     label: str = "",
-    factor: float = 1.0,
-    digits: int = 3,
     unit: str = "",
     *,
+    digits: int | None = None,
     per_segment: bool = False,
     in_sweeps: bool = True,
     default: Any = None,
@@ -85,15 +89,15 @@ def number(
     Args:
         meaning: What it is, in a line.
         label: What a table calls it; empty where no table shows it.
-        factor: What a table multiplies it by.
-        digits: Digits behind the point in a table.
         unit: Unit in a table.
+        digits: Digits behind the point in a table; None for those of the unit.
         per_segment: Whether there is one for each segment.
         in_sweeps: Whether a sweep may output it.
         default: Value where it is not known.
         factory: Makes that value, where it is a list.
     """
-    metadata = {"number": (meaning, label, factor, digits, unit, per_segment, in_sweeps)}
+    digits = _SHOWN.get(unit, (1.0, 3))[1] if digits is None else digits
+    metadata = {"number": (meaning, label, unit, digits, per_segment, in_sweeps)}
     if factory is not None:
         return field(default_factory=factory, metadata=metadata)
     return field(default=default, metadata=metadata)

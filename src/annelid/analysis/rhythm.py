@@ -41,7 +41,7 @@ class Rhythm:
     onsets_s: list[float] = number("times of those contractions", in_sweeps=False, factory=list)
     wave: bool | None = number("whether the order is 1-2-..-N over and over; in a sweep 1 or 0")
     full_cycles: int = number("how many times N successive onsets ran 1-2-..-N", default=0)
-    period_s: float | None = number("mean interval between successive contractions of a segment", "period", 1.0, 3, "s")
+    period_s: float | None = number("mean interval between successive contractions of a segment", "period", "s")
     period_std_s: float | None = number("standard deviation of those intervals")
     rhythm_verdict: Verdict | None = number("ordered, disordered or silent; none if too short", in_sweeps=False)
     rhythm_reason: str | None = number("why, in a short phrase", in_sweeps=False)

@@ -25,11 +25,11 @@ class Mesh:
     """The extremes of what the body is made of."""
 
     ring_length_min_m: float | None = number(
-        "shortest ring during the run; of a planar worm the height of a rhombus", "shortest ring", 100.0, 1, "cm"
+        "shortest ring during the run; of a planar worm the height of a rhombus", "shortest ring", "cm", digits=1
     )
-    edge_strain_max: float | None = number("largest strain of any edge of a rod", "largest edge strain", 100.0, 3, "%")
+    edge_strain_max: float | None = number("largest strain of any edge of a rod", "largest edge strain", "%", digits=3)
     pin_gap_max_m: float | None = number(
-        "largest distance between two pinned strands", "largest pin gap", 1000.0, 2, "mm"
+        "largest distance between two pinned strands", "largest pin gap", "mm", digits=2
     )
 
 
@@ -43,7 +43,7 @@ class Summary(Rhythm, Elongation, Muscles, Travel, Mesh, Gait, Energy):
     name: str = number("name of the configuration", in_sweeps=False, default="")
     status: str = number("how the run ended", in_sweeps=False, default="")
     n_segments: int = number("number of actuated segments", default=0)
-    duration_s: float | None = number("simulated time in the file", "simulated time", 1.0, 3, "s")
+    duration_s: float | None = number("simulated time in the file", "simulated time", "s")
     real_time_factor: float | None = number("simulated time over wall-clock time", "times real time")
     warnings: tuple[str, ...] = number("what is doubtful about the run, a sentence each", in_sweeps=False, default=())
 

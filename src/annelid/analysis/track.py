@@ -39,10 +39,10 @@ class Travel:
     """How far a worm came, along its initial heading."""
 
     travel_m: float | None = number(
-        "displacement of the centre of mass, negative backwards", "travel forwards, centre of mass", 1000.0, 1, "mm"
+        "displacement of the centre of mass, negative backwards", "travel forwards, centre of mass", "mm"
     )
     travel_path_m: float | None = number(
-        "length of its path forwards and backwards", "travel, forwards and backwards", 1000.0, 1, "mm"
+        "length of its path forwards and backwards", "travel, forwards and backwards", "mm"
     )
 
 

@@ -19,13 +19,13 @@ if TYPE_CHECKING:
 
 @listing("presets")
 def presets_command(
-    name: Annotated[str | None, typer.Argument(help="Print this preset or TOML file whole.")] = None,
+    name: Annotated[str | None, typer.Argument(help="Print this preset or TOML file.")] = None,
     fields: Annotated[bool, typer.Option("--fields", help="List every field with its meaning.")] = False,
 ) -> None:
-    """List the presets, or print one with all its fields.
+    """List the presets, or print one.
 
-    Each field has its source, and the preset that it is inherited from. What the command prints is a start for a file
-    of your own. Of a file that extends a preset it prints the whole worm, too.
+    Each field has its source; what the preset extends stands behind it as comments. What the command prints is a start
+    for a file of your own. With --fields it lists all fields of the worm with their values and meanings.
 
     \b
     annelid list presets

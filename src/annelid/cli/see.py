@@ -263,12 +263,12 @@ def export_command(
     annelid export riddle2025 --arena pipe.s --to mjcf -o worm_in_pipe.xml
     """
     from annelid.draw.gallery import task_bar
-    from annelid.export import Selection, find_format, selected
+    from annelid.export import FORMATS, Selection, selected
     from annelid.output import with_suffix, write_text
     from annelid.simulation.lock import LOCK_NAME
     from annelid.simulation.runfile import open_run
 
-    kind = find_format(to)
+    kind = FORMATS.find(to)
     given = {"--signals": signals, "--every": every, "--from-time": from_time, "--to-time": to_time}
     for option, value in given.items():
         if value is not None and option not in kind.options:

@@ -169,6 +169,8 @@ GONE: Mapping[str, tuple[str, Any]] = {
     "controller.extended_m": (_LOADS[1], 0.055),
     "controller.pressure_time_constant_s": ("the pressure neurons of 'sns-pressure' have 0.03 s", 0.03),
     "controller.limbs": ("'phase-chain' has no limbs", False),
+    "controller.feedback": ("'shc' always waits for the stretch of its segments", "stretch"),
+    "controller.contact_cue_N": ("'shc' always waits for the stretch of its segments", 0.2),
     "controller.coupling_per_s": ("'phase-chain' has the salamander's coupling", 10.0),
     "trial.loss_s": ("a loss lasts 0.2 s", 0.2),
     "turning.arm_N": (_TOUCH, 2.0),

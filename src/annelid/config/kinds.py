@@ -103,6 +103,16 @@ class Kind(Section):
         """
         raise NotImplementedError
 
+    def check_with(self, config: Any) -> None:
+        """Checks the section against the rest of the run that it is of.
+
+        Args:
+            config: The run's configuration, a `RunConfig`.
+
+        Raises:
+            ValueError: They do not fit; the message names the fields, the value and what is valid.
+        """
+
     def cited(self) -> tuple[tuple[str, str], ...]:
         """Returns the publications that this section rests on, as `cites`; depends on its fields where need be."""
         return self.cites

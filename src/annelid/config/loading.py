@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
-from functools import reduce
+from collections.abc import Iterable, Mapping
 from importlib import resources
 from importlib.resources.abc import Traversable
-from itertools import takewhile
 from os.path import isfile
 from pathlib import Path
 from typing import Any
@@ -18,7 +15,7 @@ from annelid.config.kinds import kind_of_file
 from annelid.config.run import SHARED, ArenaKind, BodyKind, RunConfig
 from annelid.errors import ConfigError, UnreadableText, listed, shown, suggest
 from annelid.registry import load_extensions
-from annelid.textfiles import MOST_LEVELS, check_depth, parse_toml, read_toml, toml_value
+from annelid.textfiles import MOST_LEVELS, check_depth, parse_toml, read_text, read_toml
 
 DEFAULT_BASE = "riddle2023-rods"
 """What a user's file starts from unless it says otherwise or states its own kind of body."""
@@ -42,33 +39,24 @@ def preset_names() -> list[str]:
 
 
 def preset_text(source: str | Path) -> str:
-    """Returns a preset whole, as TOML that stands alone: its own fields and the inherited ones, each with its source.
+    """Returns a preset as its file has it, each field with its source, and behind it as comments all that it extends.
 
     Args:
-        source: Name of a preset, or path of a TOML file, whose own fields go without their comments.
+        source: Name of a preset, or path of a TOML file.
 
     Returns:
-        The text; the comment of an inherited field begins with the preset that states it, or is ``default``.
+        The text, which loads as the preset does.
 
     Raises:
         ConfigError: As `load_config`.
     """
-    import tomlkit
+    load_config(source)
+    (_, text, _), *bases = reversed(_layers(source))
+    return "".join([text, *(f"\n# {name}, which it extends:\n\n{_commented(base)}" for name, base, _ in bases)])
 
-    defaults = load_config(source).model_dump(exclude_none=True)
-    headings: list[str] = []
-    tree: dict[str, Any] = {}
-    layers = _layers(source)
-    for depth, (name, fields) in enumerate(layers, start=1):
-        origin, heading = name if depth < len(layers) else "", []
-        if name in preset_names():
-            text = _text("presets", "preset", name)
-            fields = tomlkit.parse(text)
-            fields.pop("extends", None)
-            heading = takewhile(lambda line: line.startswith("#"), text.splitlines())
-        headings = [*(["", f"# Inherited from {name}:"] if origin else []), *heading, *headings]
-        tree = _merge(tree, _noted(fields, origin))
-    return "\n".join([*headings, "", *_lines(_merge(_noted(defaults, "default"), tree)), ""])
+
+def _commented(text: str) -> str:
+    return "".join(f"# {line}".rstrip() + "\n" for line in text.splitlines())
 
 
 def arena_names() -> list[str]:
@@ -218,25 +206,29 @@ def _parse_value(text: str) -> Any:
 
 def _read_tree(source: str | Path | Mapping[str, Any]) -> dict[str, Any]:
     """Merges what a source states over what it extends, renamed fields under their present names."""
-    return reduce(lambda base, change: present_fields(_merge(base, change))[0], (own for _, own in _layers(source)), {})
+    tree: dict[str, Any] = {}
+    for *_, own in _layers(source):
+        tree, _ = present_fields(_merge(tree, own))
+    return tree
 
 
 def _layers(
     source: str | Path | Mapping[str, Any], above: tuple[Path, ...] = ()
-) -> list[tuple[str, Mapping[str, Any]]]:
-    """Returns what a source states and what each states that it extends, with their names, the outermost first."""
+) -> list[tuple[str, str, Mapping[str, Any]]]:
+    """Returns name, text and fields of a source and of each that it extends, the outermost first."""
     default, folder = None, None
     if isinstance(source, Mapping):
         check_depth(source, "the configuration")
-        name, own = "", dict(source)
+        name, text, own = "", "", dict(source)
     elif (reader := kind_of_file(BodyKind, source)) is not None:
         path = Path(source)
-        return [(shown(path.name), {"name": path.stem, **reader.from_file(path)})]
+        return [(path.name, "", {"name": path.stem, **reader.from_file(path)})]
     elif isinstance(source, Path) or str(source).endswith(".toml"):
         path = Path(source)
         folder = path.parent
         # Without line breaks, so that it stands in a comment.
-        name, own = shown(path.name), read_toml(path)
+        name, text = shown(path.name), read_text(path, "the configuration file")
+        own = parse_toml(text, str(path))
         own.setdefault("name", path.stem)
         if path.resolve() in above:
             raise ConfigError(f"{path} extends itself: {listed(each.name for each in (*above, path))}")
@@ -249,59 +241,20 @@ def _layers(
         stands_alone = isinstance(body, Mapping) and "kind" in body
         default = None if stands_alone else DEFAULT_BASE
     else:
-        name, own = str(source), parse_toml(_text("presets", "preset", str(source)), str(source))
+        name, text = str(source), _text("presets", "preset", str(source))
+        own = parse_toml(text, name)
     base = own.pop("extends", default)
     if base is None:
-        return [(name, own)]
+        return [(name, text, own)]
     if not isinstance(base, str):
         raise ConfigError(f"extends = {shown(base)}: must be the name of a preset or of a TOML or MJCF file")
-    return [*_layers(base if folder is None else seen_from(folder, base), above), (name, own)]
+    return [*_layers(base if folder is None else seen_from(folder, base), above), (name, text, own)]
 
 
 def seen_from(folder: Path, source: str) -> str:
     """Returns a preset's name as it is, and the path of a file as it is seen from a folder."""
     is_file = source.endswith(".toml") or kind_of_file(BodyKind, source) is not None
     return str(folder / source) if is_file else source
-
-
-@dataclass(frozen=True)
-class _Stated:
-    """A value as TOML writes it; equal to another of the same text, whatever is noted beside it."""
-
-    value: str
-    note: str = field(compare=False)
-
-
-def _noted(table: Mapping[str, Any], origin: str) -> dict[str, Any]:
-    """Returns the fields of a table, each with its origin and its comment, which only tables of tomlkit have."""
-    from tomlkit.container import Container
-    from tomlkit.items import Item, Table
-
-    tree: dict[str, Any] = {}
-    # As a mapping, a container gives truth values without their comments.
-    pairs = [(key.key, item) for key, item in table.body if key] if isinstance(table, Container) else table.items()
-    for key, item in pairs:
-        if isinstance(item, Mapping):
-            tree[key] = _noted(item.value if isinstance(item, Table) else item, origin)
-        else:
-            written = isinstance(item, Item)
-            comment = item.trivia.comment.lstrip("# ") if written else ""
-            note = ": ".join(filter(None, (origin, comment)))
-            tree[key] = _Stated(item.as_string() if written else toml_value(item), note)
-    return tree
-
-
-def _lines(tree: Mapping[str, Any], table: str = "") -> Iterator[str]:
-    """Writes fields as TOML, those of a table before the tables in it."""
-    from tomlkit import key
-
-    named = {key(name).as_string(): field for name, field in tree.items()}
-    for name, stated in named.items():
-        if isinstance(stated, _Stated):
-            yield f"{f'{name} = {stated.value}':<30}  # {stated.note}" if stated.note else f"{name} = {stated.value}"
-    for name, inner in named.items():
-        if isinstance(inner, Mapping):
-            yield from ("", f"[{table}{name}]", *_lines(inner, f"{table}{name}."))
 
 
 def _kinds_first(override: tuple[str, Any]) -> float:

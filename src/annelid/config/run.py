@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from annelid.arena.course import Bore, Course
     from annelid.arena.surface import Shape, Surface
     from annelid.morphology import MeshGeometry
-    from annelid.protocols import Array, Controller, Plant, Steering, Values
+    from annelid.protocols import Array, Controller, Plant, Sensation, Values
 
 MOST_SAMPLES = 10_000_000
 
@@ -46,18 +46,7 @@ def _known(name: str) -> str:
     return name
 
 
-class Checked:
-    """What sections have in common that are checked against the rest of a run."""
-
-    def check_with(self, config: RunConfig) -> None:
-        """Checks the section against the rest of a configuration.
-
-        Raises:
-            ValueError: They do not fit; the message names the fields, the value and what is valid.
-        """
-
-
-class ControllerKind(Checked, Kind):
+class ControllerKind(Kind):
     """Base of the controllers' sections.
 
     Attributes:
@@ -89,9 +78,14 @@ class ControllerKind(Checked, Kind):
         """
 
 
-class TurningKind(Checked, Kind):
-    """Base of the sections that scale the two sides of a worm with half-rings."""
+class TurningKind(Kind):
+    """Base of the sections that scale the two sides of a worm with half-rings, by a rule with a state of its own.
 
+    Attributes:
+        senses: What the rule senses, names in `annelid.control.SENSED`.
+    """
+
+    senses: ClassVar[tuple[str, ...]] = ()
     registry: ClassVar[Registry[type[Any]]] = Registry("turning.kind", "annelid.control.turning")
     default: ClassVar[str] = "constant"
 
@@ -109,16 +103,23 @@ class TurningKind(Checked, Kind):
         return Goals()
 
     @abstractmethod
-    def build(self, n_segments: int, control_timestep_s: float) -> Steering:
-        """Builds the steering in its initial state.
+    def at_start(self) -> dict[str, Any]:
+        """Returns the state with which both sides are whole."""
 
-        Args:
-            n_segments: Segments of the worm.
-            control_timestep_s: Control step, s.
+    @abstractmethod
+    def advance(self, now: dict[str, Any], sensation: Sensation, timestep_s: float) -> None:
+        """Takes one control step, in place.
+
+        Raises:
+            ConfigError: The body cannot sense what the rule needs.
         """
 
+    @abstractmethod
+    def scales(self, now: dict[str, Any], n_segments: int) -> Array:
+        """Returns what is left of the activation of each half, in [0, 1], ``(n_segments, 2)``: left and right half."""
 
-class BodyKind(Checked, Kind):
+
+class BodyKind(Kind):
     """Base of the bodies' sections: what analysis, pictures, views, exports and checks ask a body.
 
     A body has one of three shapes: the mesh of a 3D worm (`geometry`), the model of a robot (`own_model`), or that of a
@@ -128,7 +129,6 @@ class BodyKind(Checked, Kind):
         needs_arena: Whether it stands on an arena, the default one where none is given.
         is_planar: Whether it moves in one plane, and is drawn from its side.
         has_skin: Whether the sides of its segments feel touch.
-        touches_ground: Whether anything of the body bears on a ground or a wall.
         can_be_pushed: Whether a trial may push it.
         is_papers: Whether it is in the paper's own formulation, which others are compared with.
         has_rigid_crossings: Whether the two strands of a crossing share a point.
@@ -143,7 +143,6 @@ class BodyKind(Checked, Kind):
     needs_arena: ClassVar[bool] = False
     is_planar: ClassVar[bool] = False
     has_skin: ClassVar[bool] = False
-    touches_ground: ClassVar[bool] = True
     can_be_pushed: ClassVar[bool] = False
     segments_field: ClassVar[str] = "body.n_segments"
     frame_size: ClassVar[tuple[int, int]] = (1280, 800)
@@ -253,7 +252,7 @@ class BodyKind(Checked, Kind):
         """
 
 
-class ArenaKind(Checked, Kind):
+class ArenaKind(Kind):
     """Base of the arenas' sections: the fields of every ground, and what the body, the pictures and the tasks ask it.
 
     Attributes:
@@ -357,7 +356,7 @@ SHARED = tuple(name for name in ArenaKind.model_fields if name != "kind")
 """Fields of every arena; a worm that is put elsewhere keeps those that the place does not state."""
 
 
-class TrialKind(Checked, Kind):
+class TrialKind(Kind):
     """Base of the sections of what goes wrong on purpose between a controller and its body; annelid has none itself."""
 
     registry: ClassVar[Registry[type[Any]]] = Registry("trial.kind")

@@ -10,7 +10,7 @@ from abc import abstractmethod
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydantic import Field
 
 from annelid.clock import SLACK_S
@@ -24,17 +24,15 @@ from annelid.protocols import (
     SIDES,
     Array,
     Controller,
+    SavedAndRecorded,
     Sensation,
     Stateful,
-    Steering,
     StridingController,
     Values,
 )
 
 Modulation = Annotated[float, Field(ge=-1, le=1)]
 Waypoint = tuple[Annotated[float, Field(ge=-1e4, le=1e4)], Annotated[float, Field(ge=-1e4, le=1e4)]]
-Now = dict[str, NDArray[Any]]
-"""All that the next step of a turning depends on."""
 HALVES = ("left", "right")
 TOUCH_STARTS_N, TOUCH_LEAST_N, TOUCH_FULL_N = 2.0, 1.0, 15.0
 """Of turning by touch: the differences that start the timer, that act while it runs, and that silence a side."""
@@ -54,33 +52,7 @@ def half_scales(modulation: ArrayLike) -> Array:
     return np.stack([1.0 - np.maximum(m, 0.0), 1.0 - np.maximum(-m, 0.0)], axis=-1)
 
 
-class SteeringKind(TurningKind):
-    """A turning by a rule that changes a state of its own at every control step.
-
-    Attributes:
-        senses: What it senses, names in `annelid.control.SENSED`.
-    """
-
-    senses: ClassVar[tuple[str, ...]] = ()
-
-    def build(self, n_segments: int, control_timestep_s: float) -> Steering:
-        """Builds the steering, as `TurningKind.build`."""
-        return RuleSteering(self, n_segments, control_timestep_s)
-
-    @abstractmethod
-    def _at_start(self) -> Now:
-        """The state with which both sides are whole."""
-
-    @abstractmethod
-    def _advance(self, now: Now, sensation: Sensation, timestep_s: float) -> None:
-        """Takes one control step, in place; refuses a body that cannot sense what the rule needs."""
-
-    @abstractmethod
-    def _scales(self, now: Now, n_segments: int) -> Array:
-        """What is left of the activation of each half, in [0, 1], ``(n_segments, 2)``."""
-
-
-class Descending(SteeringKind):
+class Descending(TurningKind):
     """What turning by descending neurons has in common: a modulation that they follow.
 
     A modulation m in [-1, 1] scales a segment's left activation by ``1 - max(m, 0)`` and its right one by
@@ -102,18 +74,21 @@ class Descending(SteeringKind):
             raise ValueError(f"turning.shares has {len(self.shares)} entries: must have {n_segments}, one per segment")
 
     @abstractmethod
-    def _wanted(self, now: Now, sensation: Sensation, timestep_s: float) -> float:
+    def _wanted(self, now: dict[str, Any], sensation: Sensation, timestep_s: float) -> float:
         """The modulation that is wanted during a control step, in [-1, 1]; may change the state."""
 
-    def _at_start(self) -> Now:
+    def at_start(self) -> dict[str, Any]:
+        """Returns the state, as `TurningKind.at_start`."""
         return {"modulation": np.array(0.0)}
 
-    def _advance(self, now: Now, sensation: Sensation, timestep_s: float) -> None:
+    def advance(self, now: dict[str, Any], sensation: Sensation, timestep_s: float) -> None:
+        """Takes a control step, as `TurningKind.advance`."""
         wanted = self._wanted(now, sensation, timestep_s)
         keeps = math.exp(-timestep_s / self.descending_time_constant_s)
         now["modulation"][...] = wanted + (float(now["modulation"]) - wanted) * keeps
 
-    def _scales(self, now: Now, n_segments: int) -> Array:
+    def scales(self, now: dict[str, Any], n_segments: int) -> Array:
+        """Returns what is left, as `TurningKind.scales`."""
         return half_scales(float(now["modulation"]) * np.array(self.shares or [1.0] * n_segments))
 
 
@@ -123,7 +98,7 @@ class ConstantTurning(Descending):
     kind: Literal["constant"] = "constant"
     modulation: Modulation = Field(default=0.0, description="wanted modulation: 1 silences the left side, -1 the right")
 
-    def _wanted(self, now: Now, sensation: Sensation, timestep_s: float) -> float:
+    def _wanted(self, now: dict[str, Any], sensation: Sensation, timestep_s: float) -> float:
         return self.modulation
 
 
@@ -141,14 +116,15 @@ class Steered(Descending):
     largest_modulation: Level = Field(default=0.9, description="size of the modulation that is never exceeded")
 
     @abstractmethod
-    def _target(self, now: Now, sensation: Sensation) -> float | None:
+    def _target(self, now: dict[str, Any], sensation: Sensation) -> float | None:
         """The wanted direction on the floor, rad, as `heading_angle` counts it; None for any."""
 
-    def _at_start(self) -> Now:
+    def at_start(self) -> dict[str, Any]:
+        """Returns the state, as `TurningKind.at_start`."""
         # The headings at the start, at the latest step, and filtered.
-        return super()._at_start() | {"headings": np.full(3, np.nan)}
+        return super().at_start() | {"headings": np.full(3, np.nan)}
 
-    def _wanted(self, now: Now, sensation: Sensation, timestep_s: float) -> float:
+    def _wanted(self, now: dict[str, Any], sensation: Sensation, timestep_s: float) -> float:
         heading = heading_angle(sensation.heading)
         if math.isnan(heading):
             raise ConfigError("steering needs a body that senses its heading, and this one does not")
@@ -175,7 +151,7 @@ class HeadingTurning(Steered):
         default=0.0, ge=-180, le=180, description="relative to that at the start, positive to the left"
     )
 
-    def _target(self, now: Now, sensation: Sensation) -> float:
+    def _target(self, now: dict[str, Any], sensation: Sensation) -> float:
         return float(now["headings"][0]) + math.radians(self.heading_deg)
 
 
@@ -196,10 +172,11 @@ class CourseTurning(Steered):
         """The waypoints."""
         return Goals(self.waypoints, self.reach_m)
 
-    def _at_start(self) -> Now:
-        return super()._at_start() | {"n_reached": np.array(0)}
+    def at_start(self) -> dict[str, Any]:
+        """Returns the state, as `TurningKind.at_start`."""
+        return super().at_start() | {"n_reached": np.array(0)}
 
-    def _target(self, now: Now, sensation: Sensation) -> float | None:
+    def _target(self, now: dict[str, Any], sensation: Sensation) -> float | None:
         for x, y in self.waypoints[max(int(now["n_reached"]), 0) :]:
             away = np.array([x - sensation.front_m[0], y - sensation.front_m[1], 0.0])
             if math.hypot(*away) > self.reach_m:
@@ -208,7 +185,7 @@ class CourseTurning(Steered):
         return None
 
 
-class TouchTurning(SteeringKind):
+class TouchTurning(TurningKind):
     """Turning away from contact, as the authors published it.
 
     f is the force on the right of the foremost segment minus that on its left. ``|f| > 2 N`` starts a timer of 6 s.
@@ -221,10 +198,12 @@ class TouchTurning(SteeringKind):
     senses: ClassVar[tuple[str, ...]] = ("touch_N",)
     kind: Literal["touch"] = "touch"
 
-    def _at_start(self) -> Now:
+    def at_start(self) -> dict[str, Any]:
+        """Returns the state, as `TurningKind.at_start`."""
         return {"timer": np.array(0.0), "latched": np.ones(2), "scales": np.ones(2)}
 
-    def _advance(self, now: Now, sensation: Sensation, timestep_s: float) -> None:
+    def advance(self, now: dict[str, Any], sensation: Sensation, timestep_s: float) -> None:
+        """Takes a control step, as `TurningKind.advance`."""
         if not len(sensation.touch_N):
             raise ConfigError("turning.kind = 'touch' needs a body that senses touch on the sides of its segments")
         difference_N = float(sensation.touch_N[0, RIGHT] - sensation.touch_N[0, LEFT])
@@ -240,37 +219,33 @@ class TouchTurning(SteeringKind):
         reach = SCALE_RATE_PER_S * timestep_s
         now["scales"] += np.clip(latched - now["scales"], -reach, reach)
 
-    def _scales(self, now: Now, n_segments: int) -> Array:
+    def scales(self, now: dict[str, Any], n_segments: int) -> Array:
+        """Returns what is left, as `TurningKind.scales`."""
         return np.tile(now["scales"], (n_segments, 1))
 
 
-class RuleSteering(Steering):
-    """A steering by the rule of its section of the configuration."""
+class Steering(SavedAndRecorded):
+    """A turning with its state, which goes on from control step to control step."""
 
     recorded = (("half_scale", ("segment", "half"), "1", "share of its activation that half a ring is left"),)
 
-    def __init__(self, rule: SteeringKind, n_segments: int, control_timestep_s: float) -> None:
+    def __init__(self, rule: TurningKind, n_segments: int, control_timestep_s: float) -> None:
         """Begins with all halves whole."""
         self._rule, self._n_segments, self._timestep_s = rule, n_segments, control_timestep_s
-        self.senses = rule.senses
         self.reset()
 
     def reset(self) -> None:
         """Returns to the initial state: all halves whole."""
-        self._now = self._rule._at_start()
+        self._now = self._rule.at_start()
 
-    def advance(self, sensation: Sensation, n_steps: int) -> Array:
-        """Takes control steps, as `Steering.advance`."""
+    def advance(self, sensation: Sensation, n_steps: int = 1) -> Array:
+        """Takes control steps with the same sensation but for its time; returns `TurningKind.scales` afterwards."""
         for _ in range(n_steps):
-            self._rule._advance(self._now, sensation, self._timestep_s)
-        return self.scales()
-
-    def scales(self) -> Array:
-        """Returns the scales after the latest step, in [0, 1], ``(n_segments, 2)``: left and right half."""
-        return self._rule._scales(self._now, self._n_segments)
+            self._rule.advance(self._now, sensation, self._timestep_s)
+        return self._rule.scales(self._now, self._n_segments)
 
     def _values(self) -> Values:
-        return {"half_scale": self.scales()}
+        return {"half_scale": self._rule.scales(self._now, self._n_segments)}
 
     def _coords(self) -> dict[str, list[int] | list[str]]:
         return {"segment": list(range(1, self._n_segments + 1)), "half": list(HALVES)}
@@ -299,14 +274,14 @@ class TurningController(SavedWrapper):
             raise ConfigError(f"turning needs half-rings: {2 * n_segments} muscles, not {n_muscles}")
         if not isinstance(pattern, Stateful):
             raise ConfigError(f"turning needs a pattern whose state can be saved, not {type(pattern).__name__}")
-        super().__init__(pattern, section.build(n_segments, control_timestep_s))
-        self._timestep_s = control_timestep_s
+        super().__init__(pattern, Steering(section, n_segments, control_timestep_s))
+        self._timestep_s, self._senses = control_timestep_s, section.senses
 
     @property
     def senses(self) -> tuple[str, ...]:
         """What it senses, names in `annelid.control.SENSED`."""
         pattern = getattr(self.inner, "senses", ("lengthening_m",))
-        return tuple(dict.fromkeys((*pattern, *self.between.senses)))
+        return tuple(dict.fromkeys((*pattern, *self._senses)))
 
     def reset(self, seed: int) -> None:
         """Returns to the initial state; ``seed`` is the pattern's."""
@@ -321,7 +296,7 @@ class TurningController(SavedWrapper):
         """Advances by control steps, as `annelid.protocols.StridingController.stride`."""
         first = round(sensation.time_s / self._timestep_s)
         felt = [sensation, *(sensation.later((first + k) * self._timestep_s) for k in range(1, n_steps))]
-        scales = np.stack([self.between.advance(one, 1) for one in felt])
+        scales = np.stack([self.between.advance(one) for one in felt])
         if isinstance(self.inner, StridingController):
             activation = self.inner.stride(sensation, n_steps)
         else:

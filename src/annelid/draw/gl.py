@@ -1,4 +1,4 @@
-"""Finding an OpenGL back-end that works without a screen, and drawing a MuJoCo scene with it.
+"""Finding an OpenGL back-end that works without a screen.
 
 A back-end may be missing, may fail, or may bring the whole process down, so each one is first tried in a
 process of its own. ``MUJOCO_GL`` is obeyed where the user set it.
@@ -6,23 +6,14 @@ process of its own. ``MUJOCO_GL`` is obeyed where the user set it.
 
 from __future__ import annotations
 
-import importlib
 import os
 import platform
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Sequence
 from functools import cache
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from annelid.errors import RenderingUnavailable
-
-if TYPE_CHECKING:
-    import mujoco
 
 INSTALL_LINE = "apt install libegl1 libgl1 libgl1-mesa-dri"
 """What installs a back-end that needs neither a graphics card nor a screen; newer Debian has no OSMesa."""
@@ -89,82 +80,3 @@ def find_backend() -> str:
         else "update the graphics driver, or render the run file on another machine"
     )
     raise RenderingUnavailable(f"no OpenGL back-end works here (tried {', '.join(tried)}): {remedy}")
-
-
-class Canvas(AbstractContextManager):
-    """An off-screen picture of a MuJoCo model, whose off-screen size and sampling are set here, from a free camera.
-
-    Unlike `mujoco.Renderer`, whose back-end is fixed when `mujoco` is first imported, this one takes
-    the back-end that `find_backend` chose. Smooth edges (``fine``) cost twice the time where software draws.
-    ``upright`` is the rotation from the model's axes to those that the camera's angles are meant in, ``(3, 3)``.
-    """
-
-    def __init__(
-        self,
-        model: mujoco.MjModel,
-        width: int,
-        height: int,
-        *,
-        fine: bool = True,
-        upright: NDArray[np.float64] | None = None,
-    ) -> None:
-        import mujoco
-
-        backend = find_backend()
-        model.vis.global_.offwidth = width
-        model.vis.global_.offheight = height
-        model.vis.quality.offsamples = 4 if fine else 0
-        self._model, self._size, self._upright = model, (width, height), upright
-        self.camera = mujoco.MjvCamera()
-        mujoco.mjv_defaultFreeCamera(model, self.camera)
-        # The rings stand for the actuators.
-        self._option = mujoco.MjvOption()
-        self._option.flags[mujoco.mjtVisFlag.mjVIS_ACTUATOR] = False
-        self._context: Any = None
-        self._buffers: Any = None
-        try:
-            module = importlib.import_module(f"mujoco.{'glfw' if backend in ('glx', 'wgl') else backend}")
-            self._context = module.GLContext(width, height)
-            self._context.make_current()
-            self._buffers = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_150.value)
-        except (ImportError, AttributeError, RuntimeError, OSError, mujoco.FatalError) as error:
-            self.close()
-            raise RenderingUnavailable(f"the OpenGL back-end {backend} failed: {error}") from error
-        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._buffers)
-        self._scene = mujoco.MjvScene(model, maxgeom=50_000)
-        for flag, shown in (("SHADOW", True), ("SKYBOX", True), ("REFLECTION", False), ("FOG", True)):
-            self._scene.flags[getattr(mujoco.mjtRndFlag, f"mjRND_{flag}")] = shown
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Frees the back-end."""
-        for part in (self._buffers, self._context):
-            if part is not None:
-                part.free()
-        self._buffers = self._context = None
-
-    def draw(self, data: mujoco.MjData, add: Callable[[mujoco.MjvScene], object] | None = None) -> NDArray[np.uint8]:
-        """Draws a posture, whose kinematics up to the tendons must be up to date, as pixels ``(height, width, 3)``.
-
-        ``add`` may add to the scene before it is drawn.
-        """
-        import mujoco
-
-        model, camera, scene = self._model, self.camera, self._scene
-        # Another canvas may have been opened in between.
-        self._context.make_current()
-        mujoco.mjv_updateScene(model, data, self._option, None, camera, mujoco.mjtCatBit.mjCAT_ALL.value, scene)
-        if add is not None:
-            add(scene)
-        if self._upright is not None:
-            for eye in scene.camera:
-                eye.pos = camera.lookat + (eye.pos - camera.lookat) @ self._upright
-                eye.forward, eye.up = eye.forward @ self._upright, eye.up @ self._upright
-        width, height = self._size
-        pixels = np.empty((height, width, 3), dtype=np.uint8)
-        view = mujoco.MjrRect(0, 0, width, height)
-        mujoco.mjr_render(view, scene, self._buffers)
-        mujoco.mjr_readPixels(pixels, None, view, self._buffers)
-        return pixels[::-1]

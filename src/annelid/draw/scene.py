@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from importlib import import_module
 from typing import Any
 
 import mujoco
@@ -14,9 +16,9 @@ from annelid.config import RunConfig
 from annelid.draw.camera import FIELD_OF_VIEW_DEG, FIXED, fitting_distance, picture_points, view_angles
 from annelid.draw.canvas import CONTRACTED
 from annelid.draw.drawn_worm import DrawnRobot, DrawnWorm, dim, set_fog
-from annelid.draw.gl import Canvas
-from annelid.draw.overlay import BRIGHT, Overlay, background_of, bar_length
-from annelid.errors import RunFileError
+from annelid.draw.gl import find_backend
+from annelid.draw.overlay import BRIGHT, Overlay, background_of
+from annelid.errors import RenderingUnavailable, RunFileError
 from annelid.protocols import Array
 from annelid.simulation.anatomy import Anatomy
 from annelid.simulation.runfile import Run
@@ -26,8 +28,12 @@ ROOM = 1.3
 PALE = 3.0  # on white, what lies this many half worms behind its middle would vanish
 
 
-class _Scene(Canvas):
-    """Pictures of a worm from one direction and distance, with or without smooth edges (``fine``) and words on them."""
+class _Scene(AbstractContextManager):
+    """Off-screen pictures of a worm from one direction and distance, whose model's off-screen size is set here.
+
+    Unlike `mujoco.Renderer`, whose back-end is fixed when `mujoco` is first imported, it takes the back-end that
+    `find_backend` chose. Smooth edges (``fine``) cost twice the time where software draws.
+    """
 
     def __init__(
         self,
@@ -37,27 +43,69 @@ class _Scene(Canvas):
         distance_m: float,
         *,
         fine: bool,
-        upright: Array | None,
         background: str = "floor",
         words: bool = True,
     ) -> None:
-        super().__init__(worm.model, *size, fine=fine, upright=upright)
-        self._worm = worm
+        backend, model = find_backend(), worm.model
+        model.vis.global_.offwidth, model.vis.global_.offheight = size
+        model.vis.quality.offsamples = 4 if fine else 0
+        self._worm, self._size = worm, size
         self.legend = worm.legend()
         self.pixels_per_m = size[1] / (2.0 * math.tan(math.radians(FIELD_OF_VIEW_DEG) / 2) * distance_m)
-        self.bar_m = bar_length(size[0], self.pixels_per_m)
         behind = background_of(background)
         self._overlay = Overlay(size, self.legend, self.pixels_per_m, behind.ink, behind.haze) if words else None
+        self.camera = mujoco.MjvCamera()
+        mujoco.mjv_defaultFreeCamera(model, self.camera)
         self.camera.azimuth, self.camera.elevation = angles_deg
         self.camera.distance = distance_m
+        # The rings stand for the actuators.
+        self._option = mujoco.MjvOption()
+        self._option.flags[mujoco.mjtVisFlag.mjVIS_ACTUATOR] = False
+        self._context: Any = None
+        self._buffers: Any = None
+        try:
+            module = import_module(f"mujoco.{'glfw' if backend in ('glx', 'wgl') else backend}")
+            self._context = module.GLContext(*size)
+            self._context.make_current()
+            self._buffers = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_150.value)
+        except (ImportError, AttributeError, RuntimeError, OSError, mujoco.FatalError) as error:
+            self.close()
+            raise RenderingUnavailable(f"the OpenGL back-end {backend} failed: {error}") from error
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._buffers)
+        self._scene = mujoco.MjvScene(model, maxgeom=50_000)
+        for flag, shown in (("SHADOW", True), ("SKYBOX", True), ("REFLECTION", False), ("FOG", True)):
+            self._scene.flags[getattr(mujoco.mjtRndFlag, f"mjRND_{flag}")] = shown
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Frees the back-end."""
+        for part in (self._buffers, self._context):
+            if part is not None:
+                part.free()
+        self._buffers = self._context = None
 
     def _draw(
         self, qpos: NDArray[np.floating], activation: NDArray[np.floating] | None, target_m: Array, caption: str = ""
     ) -> NDArray[np.uint8]:
-        self._worm.pose(qpos, activation)
-        self.camera.lookat[:] = target_m
-        pixels = self.draw(self._worm.posture, self._worm.add_links)
-        return pixels if self._overlay is None else self._overlay.stamped(pixels, caption)
+        worm, camera, scene = self._worm, self.camera, self._scene
+        worm.pose(qpos, activation)
+        camera.lookat[:] = target_m
+        # Another scene may have been opened in between.
+        self._context.make_current()
+        parts = mujoco.mjtCatBit.mjCAT_ALL.value
+        mujoco.mjv_updateScene(worm.model, worm.posture, self._option, None, camera, parts, scene)
+        worm.add_links(scene)
+        for eye in scene.camera:
+            eye.pos = camera.lookat + (eye.pos - camera.lookat) @ worm.upright
+            eye.forward, eye.up = eye.forward @ worm.upright, eye.up @ worm.upright
+        width, height = self._size
+        pixels = np.empty((height, width, 3), dtype=np.uint8)
+        view = mujoco.MjrRect(0, 0, width, height)
+        mujoco.mjr_render(view, scene, self._buffers)
+        mujoco.mjr_readPixels(pixels, None, view, self._buffers)
+        return pixels[::-1] if self._overlay is None else self._overlay.stamped(pixels[::-1], caption)
 
 
 class WormScene(_Scene):
@@ -96,7 +144,7 @@ class WormScene(_Scene):
         if camera in FIXED:
             set_fog(worm.model, 2.0 * distance, 6.0 * distance)
         look: dict[str, Any] = {"background": background, "words": words}
-        super().__init__(worm, (width, height), angles, distance, fine=fine, upright=worm.upright, **look)
+        super().__init__(worm, (width, height), angles, distance, fine=fine, **look)
 
     def picture(self, frame: int) -> NDArray[np.uint8]:
         """Draws one recorded frame, as pixels of shape ``(height, width, 3)``."""
@@ -119,7 +167,7 @@ class PostureScene(_Scene):
         offsets = (points - _middle(points)) @ worm.upright.T
         distance = ROOM * fitting_distance(offsets, *angles, width / height)
         dim(worm.model, angles[1])
-        super().__init__(worm, (width, height), headed, distance, fine=False, upright=worm.upright)
+        super().__init__(worm, (width, height), headed, distance, fine=False)
 
     def picture(self, qpos: Array, activation: Array, caption: str) -> NDArray[np.uint8]:
         """Draws a posture, with activation ``(n_muscles,)``, as pixels of shape ``(height, width, 3)``."""
@@ -177,10 +225,10 @@ def render_still(
     drawn = model.qpos0 if qpos is None else qpos
     points = worm.part_ends(drawn)
     target = _middle(points)
-    distance = fitting_distance(points - target, *angles_deg, size[0] / size[1])
+    distance = fitting_distance((points - target) @ worm.upright.T, *angles_deg, size[0] / size[1])
     reach = float(np.linalg.norm(points - target, axis=1).max())
     set_fog(model, distance - reach, distance + PALE * reach)
-    with _Scene(worm, size, angles_deg, distance, fine=True, upright=None, words=False) as scene:
+    with _Scene(worm, size, angles_deg, distance, fine=True, words=False) as scene:
         return Still(scene._draw(drawn, activation, target), target, angles_deg, distance)
 
 

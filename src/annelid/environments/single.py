@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from annelid.draw.camera import view_angles
 from annelid.draw.scene import PostureScene
 from annelid.environments.observation import Layout, Observation, Place, Route, layout_of
-from annelid.environments.task import COARSE, reward_terms, task_of
+from annelid.environments.task import COARSE, task_of
 from annelid.errors import ConfigError, SimulationStopped, require_at_least, suggest
 from annelid.morphology import Array
 from annelid.protocols import Sensation
@@ -166,15 +166,16 @@ class WormEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             self._observation = self._observed(before)
         now = self._now
         passed = not stopped and task.goal_m is not None and now.place.along_m >= task.goal_m
-        per_length_and_s = 1.0 / (length_m * task.interval_s)
-        terms = reward_terms(
-            task.weights,
-            (now.place.along_m - before.place.along_m) * per_length_and_s,
-            (now.slid_m - before.slid_m) * per_length_and_s,
-            self._activation,
-            passed=passed,
-            broke_down=bool(stopped),
-        )
+        # Where the simulation broke down, nothing else counts: the worm is where it was.
+        weights, per_length_and_s = task.weights, 1.0 / (length_m * task.interval_s)
+        effort = 0.0 if stopped else float(np.mean(self._activation * self._activation))
+        terms = {
+            "reward_progress": weights.progress * ((now.place.along_m - before.place.along_m) * per_length_and_s),
+            "reward_effort": 0.0 - weights.effort * effort,
+            "reward_slip": 0.0 - weights.slip * ((now.slid_m - before.slid_m) * per_length_and_s),
+            "reward_success": weights.success * float(passed),
+            "reward_failure": 0.0 - weights.failure * float(bool(stopped)),
+        }
         info = {
             **terms,
             "time_s": self._n_steps * task.interval_s,

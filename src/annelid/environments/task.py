@@ -6,12 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
-import numpy as np
-
 from annelid.body import worm_of
 from annelid.config import LEVELS, Clock, RunConfig, load_config
 from annelid.errors import ConfigError, require_at_least, require_positive, suggest
-from annelid.morphology import Array
 
 COARSE = "coarse"
 COARSE_BASE = "fast"
@@ -89,29 +86,6 @@ def task_of(
     reach_m = config.arena.reach_m() if config.arena is not None else None
     goal_m = None if reach_m is None else reach_m[1] or worm_of(config).geometry().length_m
     return Task(config, moves, steps, checked, float(start_activation), goal_m)
-
-
-def reward_terms(
-    weights: Weights, speed: float, slip_speed: float, action: Array, *, passed: bool, broke_down: bool
-) -> dict[str, float]:
-    """Returns the terms of a step's reward by name, whose sum it is.
-
-    Args:
-        weights: What they are multiplied by.
-        speed: Of the worm's middle along its route, body lengths a second.
-        slip_speed: At which its segments slid on the ground, in the mean, body lengths a second.
-        action: The activations that it was given, ``(n_muscles,)``.
-        passed: Whether it has come through its pipe in this step.
-        broke_down: Whether its simulation broke down; then nothing else counts.
-    """
-    moved = 0.0 if broke_down else 1.0
-    return {
-        "reward_progress": weights.progress * moved * speed,
-        "reward_effort": 0.0 - weights.effort * moved * float(np.mean(action * action)),
-        "reward_slip": 0.0 - weights.slip * moved * slip_speed,
-        "reward_success": weights.success * float(passed),
-        "reward_failure": 0.0 - weights.failure * float(broke_down),
-    }
 
 
 def _worm(preset: str, changes: Mapping[str, Any], arena: str | None, fidelity: str | None) -> RunConfig:

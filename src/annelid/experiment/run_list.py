@@ -8,10 +8,9 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
-from annelid.errors import AnnelidError, ConfigError, RunFileError
+from annelid.errors import ConfigError, RunFileError
 from annelid.experiment.outcome import OUTCOME_NAME
 from annelid.simulation.runfile import FILE_NAME, STATUSES, read_config
-from annelid.textfiles import parse_json
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +37,7 @@ def runs_below(root: Path) -> Iterator[Kept]:
     for name, below, files in os.walk(root):
         # Hidden folders are attempts of studies that still go on or were killed.
         below[:] = sorted(entry for entry in below if not entry.startswith("."))
-        if FILE_NAME in files or (OUTCOME_NAME in files and _is_outcome(Path(name) / OUTCOME_NAME)):
+        if FILE_NAME in files or OUTCOME_NAME in files:
             yield _kept(Path(name), files)
 
 
@@ -60,12 +59,3 @@ def _kept(folder: Path, files: list[str]) -> Kept:
     states = [(folder / file).lstat() for file in files]
     changed = datetime.fromtimestamp(max(state.st_mtime for state in states), UTC).isoformat(timespec="seconds")
     return Kept(folder, preset, duration_s, sum(state.st_size for state in states), changed, status)
-
-
-def _is_outcome(path: Path) -> bool:
-    """Whether a file is an outcome, of this or another version."""
-    try:
-        content = parse_json(path.read_text(encoding="utf-8"), "the outcome")
-    except (AnnelidError, OSError, ValueError):
-        return False
-    return isinstance(content, dict) and {"reader", "summary", "rhythm"} <= content.keys()

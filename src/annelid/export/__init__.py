@@ -1,6 +1,6 @@
 """What goes elsewhere: runs as tables, pictures, pages and models."""
 
-from annelid.export.formats import FORMATS, SELECTION, Format, find_format
+from annelid.export.formats import FORMATS, SELECTION, Format
 from annelid.export.tables import Progress, Selection, about, selected, signal_names
 from annelid.lazy import moved
 
@@ -11,7 +11,6 @@ __all__ = [
     "Progress",
     "Selection",
     "about",
-    "find_format",
     "selected",
     "signal_names",
 ]

@@ -83,15 +83,6 @@ FORMATS: Registry[Format] = Registry("format", "annelid.export", error=RunFileEr
 """Every format by its name; a module in this package, or one of another package, adds its own."""
 
 
-def find_format(name: str) -> Format:
-    """Returns the format of a name.
-
-    Raises:
-        RunFileError: There is none; the sentence suggests the nearest.
-    """
-    return FORMATS.find(name)
-
-
 def write_mjcf(run: Run, path: Path) -> Path:
     """Writes a run's 3D worm and arena for plain MuJoCo, with the last state as a keyframe.
 

@@ -7,27 +7,22 @@ killed process leaves behind locks nothing.
 from __future__ import annotations
 
 import errno
-import json
 import os
-import shlex
-import sys
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from datetime import datetime
 from functools import wraps
 from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, ParamSpec, TypeVar
 
-from annelid.errors import ConfigError, RunFileError, shortened
+from annelid.errors import ConfigError, RunFileError
 
 if TYPE_CHECKING:
     from filelock import BaseFileLock
 
 LOCK_NAME = ".annelid.lock"
 
-_HOLDER_BYTES = 4096
 _ATTEMPTS = 100
 _WITHOUT_LOCKS = frozenset({errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOTSUP})
 
@@ -134,24 +129,18 @@ def _take(lock: BaseFileLock, folder: Path, new: bool) -> None:
 
 
 def _write_holder(descriptor: int) -> None:
-    program = Path(sys.argv[0]).name or "python"
-    since = datetime.now().astimezone().isoformat(sep=" ", timespec="seconds")
-    command = shlex.join([program, *sys.argv[1:]])[: _HOLDER_BYTES // 8]
     os.ftruncate(descriptor, 0)
     # Windows keeps others from reading the first byte of a locked file.
-    os.write(descriptor, b" " + json.dumps({"pid": os.getpid(), "since": since, "command": command}).encode())
+    os.write(descriptor, f" {os.getpid()}".encode())
 
 
 def _holder(file: Path) -> str:
-    """Says who holds a lock, as far as its file tells."""
+    """Says who holds a lock, as far as its file, which may be anybody's, tells."""
     try:
         with file.open("rb") as content:
             content.seek(1)
-            said = json.loads(content.read(_HOLDER_BYTES))
-        # The file may be anybody's, and the sentence is one line.
-        since, command = (shortened(ascii(str(said[key]))[1:-1]) for key in ("since", "command"))
-        return f"process {shortened(str(int(said['pid'])))} (since {since}: {command})"
-    except (OSError, ValueError, TypeError, KeyError, OverflowError, RecursionError):
+            return f"process {int(content.read(20))}"
+    except (OSError, ValueError):
         return "another process"
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -116,7 +115,7 @@ def open_run(path: str | Path) -> Run:
         RunFileError: There is no such file, it is no annelid run, or it is truncated or damaged.
     """
     file = examined_file(path)[0]
-    with _dataset(file) as dataset:
+    with present_data(file) as dataset:
         marks = dataset[[*_BOOKKEEPING, WARNINGS, CPU_TIME]].load()
         n_samples = _count(marks, "samples_written", dataset.sizes["time"])
         n_frames = _count(marks, "frames_written", dataset.sizes["frame"])
@@ -132,7 +131,7 @@ def open_run(path: str | Path) -> Run:
         message = str(marks["status_message"].values)
         doubts = tuple(str(marks[WARNINGS].values).splitlines())
         cpu_time_s = float(marks[CPU_TIME])
-    return Run(file, data, _config(file, data.attrs), status, message, doubts, cpu_time_s)
+    return Run(file, data, config_in(file, data.attrs), status, message, doubts, cpu_time_s)
 
 
 def migrated(data: xarray.Dataset) -> xarray.Dataset:
@@ -140,28 +139,15 @@ def migrated(data: xarray.Dataset) -> xarray.Dataset:
 
     Files of schema 0, those of annelid 0.1, have neither warnings nor processor time. Their configuration is valid as
     it is: fields that are newer default to what 0.1 did, guards excepted. Signals that 0.1 did not record stay absent.
-    Up to schema 1 the name of a configuration decided which published numbers its runs were compared with. Up to schema
-    6 there were fields that are gone (`annelid.config.checking.GONE`); a run in which one acted says so among its
-    warnings, and is not continued.
+    Those up to schema 1 name no published numbers. Up to schema 6 there were fields that are gone
+    (`annelid.config.checking.GONE`); a run in which one acted says so among its warnings, and is not continued.
     """
     if data.attrs.get(SCHEMA, 0) < 1:
         added = {WARNINGS: ((), ""), CPU_TIME: ((), 0.0)}
         data = data.assign({name: value for name, value in added.items() if name not in data})
-    if data.attrs.get(SCHEMA, 0) < 2:
-        data = data.assign_attrs(config=_with_published(data.attrs["config"]))
     if data.attrs.get(SCHEMA, 0) < SCHEMA_VERSION:
         data = _without_gone_fields(data)
     return data.assign_attrs({SCHEMA: SCHEMA_VERSION})
-
-
-def _with_published(config: str) -> str:
-    try:
-        tree = parse_json(config, "the configuration")
-        if named := re.match(r"riddle2022|riddle2023|wang\Z", tree["name"]):
-            return json.dumps(tree | {"published": named[0]})
-    except (UnreadableText, KeyError, TypeError):
-        pass  # What is wrong with it, its reader says.
-    return config
 
 
 def _without_gone_fields(data: xarray.Dataset) -> xarray.Dataset:
@@ -208,7 +194,7 @@ def _reading(file: Path) -> Iterator[None]:
 
 
 @contextmanager
-def _dataset(file: Path) -> Iterator[xarray.Dataset]:
+def present_data(file: Path) -> Iterator[xarray.Dataset]:
     """Opens a checked run file in the present schema."""
     import xarray
 
@@ -219,18 +205,8 @@ def _dataset(file: Path) -> Iterator[xarray.Dataset]:
 def read_config(path: str | Path) -> RunConfig:
     """Reads the configuration of a run, from its folder or its file; raises as `open_run`."""
     file = examined_file(path)[0]
-    with _dataset(file) as dataset:
-        return _config(file, dataset.attrs)
-
-
-def refuse_gone_numerics(path: str | Path) -> None:
-    """Raises `RunFileError` where a field acted in a run that is gone, since nothing computes such a worm any more."""
-    file = examined_file(path)[0]
-    with _dataset(file) as dataset:
-        if acted := dataset.attrs.get(ACTED):
-            raise RunFileError(
-                f"{file} cannot be continued: {acted} acted in it, and is no field any more; run it anew"
-            )
+    with present_data(file) as dataset:
+        return config_in(file, dataset.attrs)
 
 
 def read_checkpoint(path: str | Path) -> Checkpoint:
@@ -329,7 +305,8 @@ def _count(marks: xarray.Dataset, name: str, most: int) -> int:
     return value
 
 
-def _config(file: Path, attrs: dict[Any, Any]) -> RunConfig:
+def config_in(file: Path, attrs: dict[Any, Any]) -> RunConfig:
+    """Returns the configuration among the attributes of a run file in the present schema; errors name the file."""
     try:
         return RunConfig.model_validate_json(attrs["config"])
     except ValidationError as error:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from math import exp, log, log1p, sqrt
+from math import log, log1p, sqrt
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Self
 
 from pydantic import Field, model_validator
 
@@ -33,17 +33,13 @@ ROBOT = Path(__file__).parent.parent / "data" / "identify_robot.toml"
 
 
 class Prior(Section):
-    """What is known of a parameter before."""
+    """What is known of a parameter before: a log-normal distribution."""
 
     mean: Positive = Field(description="mean, in the parameter's unit")
     sd: Positive = Field(description="standard deviation, in the same")
-    shape: Literal["normal", "log-normal"] = Field(default="log-normal", description="distribution")
 
     def row(self, log_value: float) -> tuple[float, float]:
         """Returns the residual of a logarithm in standard deviations, and its derivative."""
-        if self.shape == "normal":
-            value = exp(log_value)
-            return (value - self.mean) / self.sd, value / self.sd
         square = log1p((self.sd / self.mean) ** 2)
         return (log_value - log(self.mean) + square / 2.0) / sqrt(square), 1.0 / sqrt(square)
 

@@ -69,14 +69,6 @@ def loop_command(
     ] = None,
     ticks: Ticks = _TICKS,
     potentiometer: Potentiometer = _POTENTIOMETER,
-    sense: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME",
-            help="What a robot senses: lengthening_m, touch_N, heading_rad or front_m; may be repeated"
-            "  [default: what the controller is given]",
-        ),
-    ] = None,
     assignments: Assignments = None,
     segments: Segments = None,
     duration: Annotated[float | None, typer.Option(help="Time to run, s.")] = None,
@@ -136,7 +128,6 @@ def loop_command(
             watchdog=watchdog,
             limits=limits,
             wiring=wiring,
-            senses=sense,
             progress=False if quiet else None,
             overwrite=force,
         )

@@ -209,9 +209,7 @@ class Interface:
     @property
     def shapes(self) -> dict[str, tuple[int, ...]]:
         """Shape of everything that is sensed, by name."""
-        n = self.n_segments
-        of = {"lengthening_m": (n,), "touch_N": (n, 4), "heading_rad": (1,), "front_m": (2,)}
-        return {name: of[name] for name in self.senses}
+        return {name: SENSED[name].shape(self.n_segments) for name in self.senses}
 
     @property
     def n_sensed(self) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -49,7 +49,6 @@ def drive(
     limits: Limits | None = None,
     wiring: Wiring | None = None,
     controller: Controller | Callable[[Sensation], ArrayLike] | None = None,
-    senses: Sequence[str] | None = None,
     progress: bool | ProgressCallback | None = None,
     overwrite: bool = False,
     clock: Callable[[], float] = time.perf_counter,
@@ -70,7 +69,6 @@ def drive(
         limits: On what is sent to a robot.
         wiring: Of a robot of servos.
         controller: Instead of the configured one, as in `annelid.simulate`; not beside firmware.
-        senses: What a robot senses, names in `annelid.control.SENSED`; None for what the controller is given.
         progress: As in `annelid.simulate`.
         overwrite: Allow a folder that is not empty.
         clock: Time that never goes back, s.
@@ -97,7 +95,7 @@ def drive(
             f"for example {1.0 / timestep_s / min(max(n_steps, 1), MOST_STEPS):g} Hz"
         )
     body = build_plant(config)
-    interface = _interface(config, body, senses)
+    interface = _interface(config, body)
     pace = Pace(1.0 / rate_hz, clock, sleep)
     sensation = body.reset(0)
     rest_m = lengthening_m(sensation.rest_stretch_m, 0.0 * sensation.rest_stretch_m)
@@ -127,9 +125,8 @@ def drive(
     return Driven(run, report | {part.partner.who: part.partner.to_dict() for part in parts})
 
 
-def _interface(config: RunConfig, body: Plant, senses: Sequence[str] | None) -> Interface:
-    if senses is None:
-        configured = build_controller(config.model_copy(update={"trial": None}), body)
-        senses = list(getattr(configured, "senses", ("lengthening_m",)))
-    timestep_us = round(1e6 * config.clock.control_timestep_s)
-    return Interface(tuple(senses), body.n_segments, body.n_muscles, timestep_us)
+def _interface(config: RunConfig, body: Plant) -> Interface:
+    """What passes between body and controller: what the configured controller senses, and activation."""
+    configured = build_controller(config.model_copy(update={"trial": None}), body)
+    senses = getattr(configured, "senses", ("lengthening_m",))
+    return Interface(tuple(senses), body.n_segments, body.n_muscles, round(1e6 * config.clock.control_timestep_s))

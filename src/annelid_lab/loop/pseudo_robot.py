@@ -8,7 +8,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from annelid.errors import require_at_least, require_finite, require_positive
 from annelid_lab.loop.links import MOST_READ
 from annelid_lab.loop.servos import BROADCAST, WATCHDOG_UNIT_S, Instruction, PacketDecoder, Register, Wiring, packet
 
@@ -62,13 +61,7 @@ class PseudoRobot:
             wiring: Positions and counts.
             clock: Time that never goes back, s.
             sleep: Waits so many seconds.
-
-        Raises:
-            ConfigError: A number is negative, not finite, or a lag is 0.
         """
-        require_finite(reach_m=reach_m, lag_s=lag_s, noise_m=noise_m, latency_s=latency_s)
-        require_at_least(0, reach_m=reach_m, noise_m=noise_m, latency_s=latency_s, seed=seed)
-        require_positive(lag_s=lag_s)
         self.wiring = wiring or Wiring()
         self._n_segments, self._n = n_segments, n_muscles
         self._reach_m, self._lag_s, self._noise_m, self._latency_s = reach_m, lag_s, noise_m, latency_s

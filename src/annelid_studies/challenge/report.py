@@ -47,20 +47,6 @@ def ranking_table(found: Sequence[Standing]) -> TerminalTable:
     return terminal_table(tabulated(overall, columns), "All tasks", caption="with 95 % intervals over draws")
 
 
-def cost_table(found: Sequence[Standing]) -> TerminalTable:
-    """Lays out what speed costs over all tasks, and how many runs were refused."""
-    columns: Mapping[str, Callable[[Standing], str]] = {
-        "entrant": lambda one: one.entrant,
-        "refused": lambda one: f"{one.refused:.2f}",
-        "recovery (s)": lambda one: _with_interval(one.recovery_s, np.nan, np.nan),
-        "slip (J/m)": lambda one: _with_interval(one.slip_J_per_m, np.nan, np.nan, 1),
-        "work (J/m)": lambda one: _with_interval(one.work_J_per_m, np.nan, np.nan, 0),
-        "motors (J/m)": lambda one: _with_interval(one.electric_J_per_m, np.nan, np.nan, 0),
-    }
-    overall = [one for one in found if one.task == ALL]
-    return terminal_table(tabulated(overall, columns), "Costs")
-
-
 def speed_table(found: Sequence[Standing], taus: Sequence[Mapping[str, float]] = ()) -> TerminalTable:
     """Lays out mean speeds, a row a task and a column an entrant, and Kendall's tau of comparisons that were made."""
     overall = [one.entrant for one in found if one.task == ALL]

@@ -139,9 +139,6 @@ def robustness_command(
     controller: Annotated[
         list[str] | None, typer.Option(metavar="KIND", help="Only this one; may be repeated.  [default: all four]")
     ] = None,
-    keep: Annotated[
-        bool, typer.Option("--keep", help="Keep what robustness.json says of points run by other versions of the code.")
-    ] = False,
     jobs: Jobs = None,
     scheduler: SchedulerAddress = None,
     quiet: OnlyPaths = False,
@@ -151,8 +148,8 @@ def robustness_command(
     The designed sample varies sensor noise, friction, physics step, number of segments and stiffness. Every worm is
     driven by four controllers: sns (the paper's, with the preset's tolerance), sns-tolerance (the paper's, with the
     tolerance that its body needs), sns-robust, and timed (a wave without sensing). Writes robustness.json and
-    robustness.md after every run, and keeps runs, so that a second call goes on where the first was stopped. All 300
-    points take about 25 hours of one core for each controller.
+    robustness.md, and keeps runs: a second call goes on where the first was stopped, and one with more points computes
+    only these. All 300 points take about 25 hours of one core for each controller.
 
     \b
     annelid study robustness --points 10 -o draft     the first ten points
@@ -168,7 +165,6 @@ def robustness_command(
             points,
             controllers=tuple(controller or CONTROLLERS),
             n_segments=segments,
-            keep=keep,
             executor=store.executor,
             progress=store.progress,
         )
@@ -256,5 +252,5 @@ def challenge_command(
         report.write_tasks(ranked, taus, output / "tasks.csv"),
         report.ranking_figure(ranked, output / "challenge"),
     ]
-    tables = report.ranking_table(ranked), report.cost_table(ranked), report.speed_table(ranked, taus)
+    tables = report.ranking_table(ranked), report.speed_table(ranked, taus)
     print_results(written, *tables, quiet=quiet)

@@ -1,6 +1,6 @@
 """Limit cycles of a worm under its nervous system: found by shooting, linearised, and kicked.
 
-The return map of a section is iterated, or solved by Newton's method, until the orbit closes; state-transition
+The return map of a section is iterated until the orbit closes; state-transition
 matrices along it give the Floquet multipliers and the phase response (Seydel 2010, ch. 7; Ermentrout & Terman 2010,
 ch. 8). Steps of finite length are not a flow: their trivial multiplier is not 1, and kinks within a step take it
 further away; `Continuous` and `Piecewise` of `annelid_studies.limit_cycle.flow` take care of both.
@@ -35,11 +35,9 @@ from annelid_studies.limit_cycle.flow import (
 # Step whose change is the vector field, and the step that the field is integrated with, s.
 _FIELD_STEP_S = 1e-5
 _CONTINUOUS_STEP_S = 1e-3
-_MOST_RETURNS, _MOST_NEWTON = 40, 12
+_MOST_RETURNS = 40
 # Size of a perturbation, as a share of the state's range.
 _PERTURBATION = 1e-6
-# A closing error that shrinks by less than this factor a return calls for Newton's method.
-_SLOW = 0.5
 # Copies that run at once, for the processor's cache.
 _MOST_COPIES = 2048
 
@@ -65,7 +63,6 @@ class LimitCycle:
         period_s: Period, s.
         timestep_s: Step that it was computed with, s.
         closing_error: Largest distance between beginning and end in any state, as a share of its range.
-        n_returns: Returns to the section (or Newton steps) that it took to close the orbit.
         time_s: Instants, s, from 0 to the period, ``(n_phases + 1,)``.
         state: Shape ``(n_phases + 1, n_states)``.
         switch_time_s: When a switch moves, s, ``(n_moves,)``.
@@ -79,7 +76,6 @@ class LimitCycle:
     period_s: float
     timestep_s: float
     closing_error: float
-    n_returns: int
     time_s: Array
     state: Array
     switch_time_s: Array = field(repr=False)
@@ -198,9 +194,8 @@ def find_limit_cycle(
 ) -> LimitCycle:
     """Finds the periodic orbit near a state, and linearises round it.
 
-    The return map of the section is iterated until the orbit closes; where it contracts by less than a half a
-    cycle, Newton's method on the return map takes over. The orbit is then cut into ``n_phases`` arcs. Every state is
-    perturbed both ways at the beginning of every arc; the central differences at the ends are the arcs'
+    The return map of the section is iterated until the orbit closes. The orbit is then cut into ``n_phases`` arcs.
+    Every state is perturbed both ways at the beginning of every arc; the central differences at the ends are the arcs'
     state-transition matrices, whose product is the monodromy. The phase response is the left eigenvector of the trivial
     multiplier, carried round the orbit backwards by the transposed transition matrices (the adjoint method).
 
@@ -218,29 +213,17 @@ def find_limit_cycle(
     """
     orbit = _first_return(flow, state, switches, section, longest_s)
     state, switches = orbit.state[-1:], orbit.switches[-1:]
-    closing, n_returns, newton = np.inf, 0, 0
-    while True:
+    for _ in range(_MOST_RETURNS):
         orbit = _first_return(flow, state, switches, section, longest_s)
-        end, last = orbit.state[-1:], orbit.switches[-1:]
-        n_returns += 1
-        before, closing = closing, float((np.abs(end - state) / orbit.range).max())
+        closing = float((np.abs(orbit.state[-1] - state[0]) / orbit.range).max())
+        state, switches = orbit.state[-1:], orbit.switches[-1:]
         if closing <= tolerance:
             break
-        if n_returns >= _MOST_RETURNS or newton >= _MOST_NEWTON:
-            raise NoLimitCycle(
-                f"the orbit does not close: after {n_returns} returns to the section its ends differ by {closing:.2g} "
-                f"of a state's range, more than {tolerance:g}"
-            )
-        if newton or (n_returns > 3 and closing > _SLOW * before):
-            newton += 1
-            transition = _product(_transitions(flow, orbit, _arcs(orbit, n_phases)))
-            along = flow.step(end, last)[0][0] - end[0]
-            project = np.eye(state.size)
-            project[:, section.state] -= along / along[section.state]
-            correction = np.linalg.solve(np.eye(state.size) - project @ transition, (end - state)[0])
-            end = state + correction
-            end[:, section.state] = section.threshold
-        state, switches = end, last
+    else:
+        raise NoLimitCycle(
+            f"the orbit does not close: after {_MOST_RETURNS} returns to the section its ends differ by {closing:.2g} "
+            f"of a state's range, more than {tolerance:g}"
+        )
     arcs = _arcs(orbit, n_phases)
     transitions = _transitions(flow, orbit, arcs)
     multipliers, adjoint = _decomposed(_product(transitions), orbit.range)
@@ -253,7 +236,6 @@ def find_limit_cycle(
         period_s=float(orbit.time[-1] * flow.timestep_s),
         timestep_s=flow.timestep_s,
         closing_error=closing,
-        n_returns=n_returns,
         time_s=orbit.time[arcs] * flow.timestep_s,
         state=state,
         switch_time_s=orbit.time[orbit.moved] * flow.timestep_s,

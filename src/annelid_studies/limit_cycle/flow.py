@@ -76,13 +76,8 @@ class BatchedController(Protocol):
         """Returns their states one control step on, and its activation, ``(n_copies, n_muscles)``."""
         ...
 
-
-@runtime_checkable
-class Piecewise(Protocol):
-    """The capability of a controller of knowing where its equations have kinks; states are as for `BatchedPlant`."""
-
     def pieces_copies(self, states: State) -> Switches:
-        """Returns in which smooth piece of the equations each copy is, ``(n_copies, n_pieces)``."""
+        """Returns in which smooth piece of its equations each copy is, ``(n_copies, n_pieces)``."""
         ...
 
 
@@ -114,7 +109,6 @@ class ClosedLoop:
                 )
         self.timestep_s = control_timestep_s
         self._parts = (plant, controller)
-        self._piecewise = controller if isinstance(controller, Piecewise) else None
         self._made_of = self._states()
         self._rest: list[State] = [
             {name: array for name, array in state.items() if array.dtype.kind not in "fb"} for state in self._made_of
@@ -167,9 +161,7 @@ class ClosedLoop:
         return parts
 
     def _with_pieces(self, parts: list[State], sensed: Switches) -> Switches:
-        if self._piecewise is None:
-            return sensed
-        return np.concatenate([sensed, self._piecewise.pieces_copies(parts[1])], axis=1)
+        return np.concatenate([sensed, cast(BatchedController, self._parts[1]).pieces_copies(parts[1])], axis=1)
 
     def _step_copies(self, parts: list[State]) -> list[State]:
         plant, controller = cast(BatchedPlant, self._parts[0]), cast(BatchedController, self._parts[1])

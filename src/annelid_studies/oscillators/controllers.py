@@ -11,8 +11,8 @@ from annelid.config import ControllerKind, Knob, NonNegative, Positive, Share
 from annelid.control import DRIVE_HINT, SegmentController, Slope, lengthening_m
 from annelid.errors import ConfigError
 from annelid.protocols import Array, Plant, Sensation, Values
-from annelid_studies.oscillators.phase_chain import BODY, PhaseState, PhaseStepper, phase_chain
-from annelid_studies.oscillators.shc import HeteroclinicRing, HeteroclinicStepper, handover_input, largest_gain_per_s
+from annelid_studies.oscillators.phase_chain import HIGHEST_DRIVE, PhaseStepper, amplitude, frequency_Hz
+from annelid_studies.oscillators.shc import HeteroclinicRing, handover_input
 
 if TYPE_CHECKING:
     from annelid.config import RunConfig
@@ -48,33 +48,19 @@ class HeteroclinicChannel(ControllerKind):
     saddle_value: float = Field(default=2.0, gt=1, le=100, description="that over the rate at which a node is left")
     noise: Share = Field(default=1e-6, description="standard deviation of the noise, per square root of a second")
     bias_per_s: Gain = Field(default=5e-4, description="constant input to every node; a larger one shortens the dwell")
-    feedback: Literal["none", "stretch", "contact"] = Field(
-        default="stretch",
-        description="what excites a node's successor: nothing, the present segment having lengthened by "
-        "stretch_cue_m, or the segment before it bearing contact_cue_N",
-    )
     feedback_gain_per_s: Gain = Field(
-        default=0.1, description="input to the successor of an active node with its cue on"
+        default=0.1, description="input to the successor of an active node whose segment has its shape; 0: none"
     )
     stretch_cue_m: NonNegative = Field(default=0.02, description="lengthening at which a segment has its shape")
-    contact_cue_N: NonNegative = Field(default=0.2, description="size of the force of the ground on an anchor")
 
     @model_validator(mode="after")
     def _it_leaves_its_first_node(self) -> Self:
-        if self.noise == 0 and self.bias_per_s == 0 and (self.feedback == "none" or self.feedback_gain_per_s == 0):
+        if self.noise == 0 and self.bias_per_s == 0 and self.feedback_gain_per_s == 0:
             raise ValueError(
                 "controller.noise, controller.bias_per_s and the feedback are all 0: the ring would rest at its first "
                 "node for ever"
             )
         return self
-
-    def check_with(self, config: RunConfig) -> None:
-        """Checks that a channel that waits for contact has a body with ground."""
-        if self.feedback == "contact" and not config.body.touches_ground:
-            raise ValueError(
-                f"controller.feedback = 'contact' has no effect on body.kind = {config.body.kind!r}, which touches no "
-                "ground: choose 'none' or 'stretch'"
-            )
 
     def build(self, config: RunConfig, plant: Plant) -> HeteroclinicController:
         """Builds the controller, as `ControllerKind.build`."""
@@ -109,10 +95,9 @@ class HeteroclinicController(SegmentController):
     """Drives a worm by a stable heteroclinic channel, with feedback that ends the dwell at a node.
 
     Node i is segment i: its activity, cut off at 1, is the segment's activation, so one segment after another
-    contracts. The cue of a node lets its successor grow. ``"stretch"``: the segment has become as long as
-    ``stretch_cue_m`` beyond rest, hence has its contracted shape. ``"contact"``: the segment before it, which widens
-    again behind the wave, bears ``contact_cue_N`` and so is an anchor (Daltorio et al. 2013: waves that wait for the
-    ground slip less). Noise of a step is a function of seed and step number.
+    contracts. The cue of a node lets its successor grow: its segment has become as long as ``stretch_cue_m`` beyond
+    rest, hence has its contracted shape (Daltorio et al. 2013: waves that wait for the body slip less). Noise of a step
+    is a function of seed and step number.
 
     Raises:
         ConfigError: Fewer than 3 segments, muscles that are neither one nor two per segment, a control step too long
@@ -136,10 +121,9 @@ class HeteroclinicController(SegmentController):
         """
         super().__init__(n_segments, n_muscles)
         self._config = config
-        ring = HeteroclinicRing(n_segments, config.growth_rate_per_s, config.saddle_value)
-        self._stepper = HeteroclinicStepper(ring, control_timestep_s)
-        largest = largest_gain_per_s(ring)
-        if config.feedback != "none" and config.feedback_gain_per_s >= largest:
+        self.ring = HeteroclinicRing(n_segments, config.growth_rate_per_s, config.saddle_value, control_timestep_s)
+        largest = self.ring.largest_gain_per_s()
+        if config.feedback_gain_per_s >= largest:
             raise ConfigError(
                 f"controller.feedback_gain_per_s = {config.feedback_gain_per_s:g}: must be less than {largest:g}, "
                 "or the channel can come to rest with all segments half contracted"
@@ -149,33 +133,25 @@ class HeteroclinicController(SegmentController):
     def reset(self, seed: int) -> None:
         """Returns to node 1: segment 1 contracted, all others at rest."""
         self._now = {
-            "activity": self._stepper.initial_state(),
+            "activity": self.ring.initial_state(),
             "cue": np.zeros(self.n_segments),
             "seed": np.array(seed, dtype=np.uint64),
             "n_steps": np.array(0),
         }
 
     def step(self, sensation: Sensation) -> Array:
-        """Advances by one control step, as `SegmentController.step`; lengths or contact forces are sensed."""
+        """Advances by one control step, as `SegmentController.step`; lengths are sensed."""
         config, now = self._config, self._now
-        now["cue"] = self._cues(sensation)
+        longer_m = lengthening_m(sensation.stretch_m, sensation.rest_stretch_m)
+        now["cue"] = (longer_m >= config.stretch_cue_m).astype(float)
         pushed = config.bias_per_s + handover_input(now["activity"], now["cue"], config.feedback_gain_per_s)
         kick = 0.0
         if config.noise:
             place = np.random.Philox(key=int(now["seed"]), counter=[0, 0, 0, int(now["n_steps"])])
             kick = config.noise * np.random.Generator(place).standard_normal(now["activity"].shape)
-        now["activity"] = self._stepper.advance(now["activity"], pushed, kick)
+        now["activity"] = self.ring.advance(now["activity"], pushed, kick)
         now["n_steps"] += 1
         return np.minimum(now["activity"][0], 1.0).repeat(self.muscles_per_segment)
-
-    def _cues(self, sensation: Sensation) -> Array:
-        if self._config.feedback == "stretch":
-            longer_m = lengthening_m(sensation.stretch_m, sensation.rest_stretch_m)
-            return (longer_m >= self._config.stretch_cue_m).astype(float)
-        if self._config.feedback == "contact":
-            load = np.linalg.norm(sensation.contact_force_N, axis=1)
-            return np.roll(load >= self._config.contact_cue_N, 1).astype(float)
-        return np.zeros(self.n_segments)
 
     def _values(self) -> Values:
         return {"node_activity": self._now["activity"][0].copy(), "cue_on": self._now["cue"].copy()}
@@ -184,7 +160,10 @@ class HeteroclinicController(SegmentController):
         return {"segment": list(range(1, self.n_segments + 1))}
 
     def _attrs(self) -> dict[str, float | int | str]:
-        return {"leaving_rate_per_s": self._stepper.ring.leaving_rate_per_s}
+        return {"leaving_rate_per_s": self.ring.leaving_rate_per_s}
+
+
+_STATE = ("phase_rad", "amplitude", "amplitude_rate_per_s")
 
 
 class PhaseChainController(SegmentController):
@@ -215,24 +194,23 @@ class PhaseChainController(SegmentController):
         super().__init__(n_segments, n_muscles)
         self._drive = config.drive
         self._lag = 2.0 * np.pi * config.waves / n_segments
-        network = phase_chain(n_segments, self._lag)
         # A slower animal is the same one in shorter steps.
-        self._stepper = PhaseStepper(network, control_timestep_s / config.slowing)
+        self._stepper = PhaseStepper(n_segments, self._lag, control_timestep_s / config.slowing)
         self.reset(0)
 
     def reset(self, seed: int) -> None:
         """Returns to the initial wave; nothing here is random."""
-        phase = -self._lag * np.arange(self.n_segments)
-        self._now = dict(vars(self._stepper.initial_state(self._drive, phase)))
+        phase = -self._lag * np.arange(self.n_segments)[np.newaxis]
+        sizes = np.full(phase.shape, amplitude(self._drive))
+        self._now = dict(zip(_STATE, (phase, sizes, np.zeros(phase.shape)), strict=True))
 
     def step(self, sensation: Sensation) -> Array:
         """Advances by one control step, as `SegmentController.step`; nothing is sensed."""
-        now = self._now
-        state = PhaseState(now["phase_rad"], now["amplitude"], now["amplitude_rate_per_s"])
-        state = self._stepper.advance(state, self._drive)
-        now |= vars(state)
-        output = self._stepper.output(state)[0]
-        most = 2.0 * float(BODY.amplitude(BODY.highest_drive))
+        state = np.stack([self._now[name] for name in _STATE])
+        state = self._stepper.advance(state, frequency_Hz(self._drive), amplitude(self._drive))
+        self._now = dict(zip(_STATE, state, strict=True))
+        (phase,), (size,), _ = state
+        output, most = size * (1.0 + np.cos(phase)), 2.0 * amplitude(HIGHEST_DRIVE)
         return np.clip(output / most, 0.0, 1.0).repeat(self.muscles_per_segment)
 
     def _values(self) -> Values:

@@ -40,7 +40,6 @@ class Boxerbaum2012Body(DynamicPlanarWorm):
     """The planar worm of Boxerbaum 2012: rhombi whose sides bend in their middle, without ground."""
 
     cites = (("boxerbaum2012", "the planar worm"),)
-    touches_ground = False
     kind: Literal["boxerbaum2012"] = "boxerbaum2012"
     middle_mass_kg: Positive = Field(default=0.02, description="mass of the middle of a side")
     torsion_stiffness_Nm_per_rad: Positive = Field(default=0.2, description="torsional spring in the middle of a side")

@@ -21,7 +21,6 @@ class PlanarBody(PlanarWorm):
     """The kinematic planar worm of Riddle 2022: rhombi with rigid sides and speed-limited actuators."""
 
     cites = (("riddle2022", "the planar worm"),)
-    touches_ground = False
     frame_size = (1280, 560)
     video_size = (960, 432)
     kind: Literal["riddle2022"] = "riddle2022"

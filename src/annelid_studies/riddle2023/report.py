@@ -49,7 +49,6 @@ def write_report(report: Report, folder: Path) -> Path:
         *_claims(report),
         *_more_figures(others, folder),
         *_examinations(report.examinations),
-        *_how_to_reproduce(report),
     ]
     contents, content = _contents(blocks), "\n\n".join(blocks)
     write_text(folder / MARKDOWN_NAME, f"{head}\n\n## Contents\n\n{contents}\n\n{content}\n")
@@ -145,19 +144,3 @@ def _examinations(examinations: Sequence[Examined]) -> list[str]:
 def _picture(picture: Path, title: str, folder: Path) -> str:
     relative = Path(os.path.relpath(picture, folder)).as_posix()
     return f"![{words(title)}]({quote(relative)})"
-
-
-def _how_to_reproduce(report: Report) -> list[str]:
-    whole = f"annelid paper -o report{' --quick' if report.effort == 'quick' else ''}"
-    names = [one.examination.name for one in report.examinations]
-    here = whole if report.claims else " ".join([whole, *(f"--only {name}" for name in names)])
-    commands = [("this report", here)]
-    commands += [(one.examination.title, f"{whole} --only {one.examination.name}") for one in report.examinations]
-    commands.append(("the page of claims in the repository", CLAIMS_COMMAND))
-    kept = (
-        "Each claim names the command that makes its number; `annelid show RUN` then prints it. Every run of this "
-        "report is kept in `runs`, every figure as PNG and SVG in `figures`. A second call computes only what is "
-        "missing or has changed."
-    )
-    rows = [[words(what), code(command)] for what, command in commands]
-    return ["## How to reproduce", kept, table(["To make", "Command"], rows)]

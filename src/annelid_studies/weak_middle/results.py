@@ -17,7 +17,7 @@ from annelid.experiment import Store
 from annelid.markdown import Table
 from annelid.output import write_csv
 from annelid_studies.tables import Results, tabulated, terminal_table
-from annelid_studies.weak_middle.pulls import ACTUATORS, Key, Setting
+from annelid_studies.weak_middle.pulls import ACTUATORS
 from annelid_studies.weak_middle.sweeps import (
     BASE,
     BASE_KEY,
@@ -107,22 +107,6 @@ def _draw(axes: Axes, readings: Sequence[Reading], quantity: Quantity) -> None:
     axes.minorticks_off()
 
 
-def settings_table(set_to: Mapping[Key, Setting]) -> TerminalTable:
-    """Tabulates how strongly the actuators pull."""
-    labels = {quantity.name: quantity.label for quantity in QUANTITIES}
-    rows = [
-        [
-            labels.get(name, name),
-            f"{value:g}" if name in labels else "",
-            f"{one.force_N:.2f}",
-            *(f"{number:.4f}" for number in (one.length_m, one.ring_length_m, one.activation)),
-        ]
-        for (name, value), one in set_to.items()
-    ]
-    header = ["worm", "", "force limit (N)", "cable wound to (m)", "ring (m)", "muscle's activation"]
-    return terminal_table(Table(header, rows), "an end pulled to the robot's elongation", n_words=2)
-
-
 def sweep_table(readings: Sequence[Reading], quantity: Quantity) -> TerminalTable:
     """Tabulates one sweep: deficit, and elongations from the front to the middle."""
     own = [one for one in readings if one.point.quantity == quantity.name and not one.point.resolution]
@@ -130,18 +114,6 @@ def sweep_table(readings: Sequence[Reading], quantity: Quantity) -> TerminalTabl
     rows = [[f"{value:g}", *(_cell(one) for one in own if one.point.value == value)] for value in values]
     title = "deficit of the interior, % (elongation from the front to the middle, cm)"
     return terminal_table(Table([quantity.label, *ACTUATORS], rows), title)
-
-
-def checks_table(readings: Sequence[Reading]) -> TerminalTable:
-    """Tabulates deficits at other resolutions, with force-limited actuators."""
-    masses = [one.point.value for one in readings if one.point.resolution]
-    rows = [
-        [f"{one.point.value:g}", one.point.resolution or "the study's", _cell(one)]
-        for one in readings
-        if (one.point.quantity, one.point.actuator.kind) == ("weight", "force-limited") and one.point.value in masses
-    ]
-    header = [WEIGHT.label, "resolution", "deficit, % (elongation, cm)"]
-    return terminal_table(Table(header, rows), "force-limited, at other resolutions", n_words=2)
 
 
 def asymmetry_table(found: Asymmetry) -> TerminalTable:
@@ -170,8 +142,8 @@ def study(store: Store, output: Path, effort: Effort) -> Results:
     """The study `weak-middle`; a quick one leaves the robot's own differences out."""
     set_to, readings = weak_middle(store, effort)
     found = asymmetry(store, set_to[BASE_KEY].force_N) if effort == "full" else None
-    tables = [settings_table(set_to), *(sweep_table(readings, quantity) for quantity in QUANTITIES)]
-    tables += [checks_table(readings), asymmetry_table(found)] if found else []
+    tables = [sweep_table(readings, quantity) for quantity in QUANTITIES]
+    tables += [asymmetry_table(found)] if found else []
     path = write_readings([*readings, *(found.readings if found else ())], output / "weak_middle.csv")
     return (path, weak_middle_figure(readings, path.with_suffix(""))), tables
 

@@ -164,17 +164,6 @@ def test_a_servo_that_is_unplugged_or_missing_or_overheated_is_said() -> None:
         plant.stride(np.ones((10, 3)))
 
 
-def test_a_servo_without_a_host_stays_where_it_is() -> None:
-    bus = Bus()
-    plant = servo_plant(bus)
-    plant.reset(0)
-    for _ in range(5):
-        plant.stride(np.ones((10, 3)))
-    there = bus.later(0.06)
-    assert 0.1 < there[0] < 0.9
-    assert bus.later(5.0) == pytest.approx(there)
-
-
 def test_the_loop_drives_a_pseudo_robot_by_the_wall_clock(tmp_path: Path) -> None:
     config = annelid.load_config("riddle2023-rods", {"duration_s": 0.6})
     driven = drive(config, tmp_path, servos=PseudoRobot(3, 3), rate_hz=50.0, watchdog=20, limits=Limits(0.0, 0.7))
@@ -327,7 +316,6 @@ def test_a_robot_and_firmware_over_udp(tmp_path: Path) -> None:
         (["--robot", "udp:127.0.0.1:9", "--rate", "300"], "a period must be 1 .. 1000 control steps"),
         (["--servos", "udp:127.0.0.1:9", "--ticks", "9", "9"], "relaxed and contracted must differ"),
         (["--robot", "udp:127.0.0.1:9", "--least", "2"], "0 <= lowest < highest <= 1"),
-        (["--robot", "udp:127.0.0.1:9", "--firmware", "udp:127.0.0.1:9", "--sense", "smell"], "'smell' can be sensed"),
     ],
 )
 def test_the_command_refuses_in_a_sentence(words: list[str], sentence: str, tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 from math import nan
 from typing import Any
 
@@ -19,7 +20,7 @@ from annelid.morphology import Array
 from annelid.simulation import Run
 from annelid_studies import slip
 from annelid_studies.riddle2023.contents import Claim, Findings, Verdict
-from annelid_studies.riddle2023.examinations.design import WORMS
+from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, SOFT, WORMS, Worm
 from annelid_studies.riddle2023.words import filled, texts
 from annelid_studies.worms import CHAIN, FAST, PLANAR, Effort, chain, fast, one_after_the_other, rods
 
@@ -38,6 +39,21 @@ PLANAR_CASES = {
     100: Case(PLANAR, {"controller.gate_time_constant_ms": 100, "body.gain": 3.6}),
 }
 """The planar worm with the gate time constants (ms) and gains that go together."""
+FLAT = Worm("planar", "planar worm, kinematic", lambda changes: Case(PLANAR, changes or {}))
+_ORDERS = tuple(product(("toolbox", "steady"), ("euler", "toolbox", "heun")))
+GATES: Mapping[Effort, Mapping[Worm, Sequence[tuple[str, str]]]] = {
+    "quick": {
+        PAPERS: (("toolbox", "euler"),),
+        SOFT: (("toolbox", "euler"), ("steady", "euler")),
+        RIGID: (("toolbox", "euler"), ("toolbox", "toolbox"), ("steady", "euler")),
+        FLAT: _ORDERS,
+    },
+    "full": {
+        PAPERS: tuple(product(("toolbox", "steady"), ("euler", "toolbox"))),
+        **dict.fromkeys((SOFT, RIGID, FLAT), _ORDERS),
+    },
+}
+"""How the sodium gates of each worm start, and the order in which its network is advanced."""
 LABELS = {worm.name: worm.label for worm in WORMS}
 """What the worms are called, nearest to the paper's first."""
 NEGLIGIBLE = 0.01
@@ -132,6 +148,11 @@ def readings_m(run: Run) -> Array:
     return np.column_stack([np.ptp(stretch, axis=0), mean])
 
 
+def gated(worm: Worm, start: str, scheme: str) -> Case:
+    """Returns the closed-loop run of a worm with a start of the gates and an update order."""
+    return worm.case({"controller.gate_start": start, "controller.scheme": scheme})
+
+
 def longer_worm(n_segments: int, worm: str) -> Case:
     """A worm of that many segments with equal muscles, each contracted in turn: the test of the interior segments."""
     changes = {"body.mesh.n_segments": n_segments, **EQUAL_RANGES, **one_after_the_other(n_segments)}
@@ -160,6 +181,7 @@ def claim_cases(effort: Effort) -> Sequence[Case]:
             for changes in ({}, TENSION_ONLY)
         ),
         *PLANAR_CASES.values(),
+        *(gated(worm, *pair) for worm, pairs in GATES[effort].items() for pair in pairs),
         *(longer_worm(n, worm) for n, worm in longer_worms(effort)),
         *(slip.CASES[name] for name in slip_runs(effort)),
     ]

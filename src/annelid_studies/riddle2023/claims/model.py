@@ -12,6 +12,7 @@ from annelid.config import field_value
 from annelid.simulation import Run
 from annelid_studies.riddle2023.claims.evidence import (
     EXACT,
+    GATES,
     MAIN,
     PLANAR_CASES,
     POLYETHYLENE_KG_PER_M3,
@@ -20,6 +21,7 @@ from annelid_studies.riddle2023.claims.evidence import (
     TUBE_AREA_M2,
     Evidence,
     Judgement,
+    gated,
     judged,
     judges,
     near,
@@ -27,7 +29,6 @@ from annelid_studies.riddle2023.claims.evidence import (
 )
 from annelid_studies.riddle2023.examinations.design import WORMS
 from annelid_studies.riddle2023.examinations.discretization import HELD, QUANTITIES
-from annelid_studies.riddle2023.examinations.gate import VARIANTS, variant
 from annelid_studies.riddle2023.figures.muscle_surface import largest_difference
 from annelid_studies.riddle2023.words import span
 from annelid_studies.worms import fast, one_after_the_other, rods
@@ -188,9 +189,9 @@ def same_network(evidence: Evidence) -> Judgement:
     rhythms = [*(outcome.rhythm for outcome, _ in evidence.runs), *others]
     walks = [rhythm.is_one_wave for rhythm in rhythms]
     gates: dict[str, list[bool]] = {"toolbox": [], "steady": []}
-    for worm, pairs in VARIANTS[evidence.effort].items():
+    for worm, pairs in GATES[evidence.effort].items():
         for start, scheme in pairs:
-            gates[start].append(evidence.store[variant(worm, start, scheme)].rhythm.is_one_wave)
+            gates[start].append(evidence.store[gated(worm, start, scheme)].rhythm.is_one_wave)
     verdict = judged(walks + gates["toolbox"] + gates["steady"], "the worm and how its gates start")
     counts = {start: sum(own) for start, own in gates.items()}
     of_all = {f"of_{start}": len(own) for start, own in gates.items()}

@@ -6,23 +6,18 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
-from annelid.experiment import Case, Store
+from annelid.experiment import Store
 from annelid_studies.riddle2023 import words
 from annelid_studies.riddle2023.contents import Findings, examination, findings
 from annelid_studies.riddle2023.examinations import design
 from annelid_studies.riddle2023.examinations.design import PAPERS, WORMS, Columns, Point, Worm
-from annelid_studies.riddle2023.words import MM
 from annelid_studies.tables import tabulated
-from annelid_studies.worms import Effort, one_after_the_other, rods
+from annelid_studies.worms import Effort, one_after_the_other
 
 FRICTIONS = (0.05, 0.1, 0.2, 0.4, 0.7, 1.0, 1.5)
 FEW = (0.05, 0.2, 0.4, 1.0, 1.5)
 """Of the paper's chain, which takes longest."""
 SLIPPERY, PAPERS_FRICTION = 0.05, 1.0
-TIMESTEPS_S = (0.005, 0.002)
-IMPEDANCE_RATIOS = (100.0, 1000.0)
 NEGLIGIBLE_M = 0.01
 """Travel below this, a fiftieth of the body in two cycles, is called negligible."""
 
@@ -45,20 +40,9 @@ def _points(effort: Effort) -> list[Point]:
     return points
 
 
-def _solved(effort: Effort) -> dict[tuple[float, float], Case]:
-    """Rods with rigid crossings at the paper's friction, by physics step (s) and the cone's impedance ratio."""
-    return {
-        (step, ratio): rods({"clock.physics_timestep_s": step, "body.formulation.friction_impedance_ratio": ratio})
-        for step in TIMESTEPS_S
-        for ratio in IMPEDANCE_RATIOS
-        if effort == "full"
-    }
-
-
 def _examine(store: Store, effort: Effort) -> Findings:
     readings = design.read(_points(effort), store)
     held = [one for one in readings if one.hold]
-    solved = {at: words.number(store[case].summary.travel_m) for at, case in _solved(effort).items()}
     at_papers = [one for one in readings if one.value == PAPERS_FRICTION]
     numbers = design.numbered(
         readings,
@@ -89,17 +73,6 @@ def _examine(store: Store, effort: Effort) -> Findings:
         "parts": parts,
         "papers": PAPERS.label,
     }
-    if solved:
-        spread, scale = float(np.ptp(list(solved.values()))), float(np.mean(np.abs(list(solved.values()))))
-        sizes = [f"{words.in_cm(t)} cm at {MM * dt:g} ms and impratio {ratio:g}" for (dt, ratio), t in solved.items()]
-        found |= {
-            "sizes": words.listed(sizes),
-            "spread": spread,
-            "share": spread / scale,
-            "artefact": "no artefact of step or friction cone"
-            if spread < 0.2 * scale
-            else "known to that accuracy only",
-        }
     columns: Columns = {
         "worm": lambda one: one.worm.label,
         "friction (1)": lambda one: f"{one.value:g}",
@@ -110,12 +83,8 @@ def _examine(store: Store, effort: Effort) -> Findings:
         "deficit, open loop (%)": lambda one: words.in_percent(one.held_deficit, 1),
         "rhythm": lambda one: words.rhythm(one.rhythm),
     }
-    said = findings("friction", found, tabulated(readings, columns), ["full" if solved else "quick"], numbers)
+    said = findings("friction", found, tabulated(readings, columns), ["quick"] if effort == "quick" else [], numbers)
     return replace(said, remarks=[*orders, *said.remarks])
 
 
-def _cases(effort: Effort) -> list[Case]:
-    return [*design.cases_of(_points(effort)), *_solved(effort).values()]
-
-
-FRICTION = examination("friction", _cases, _examine)
+FRICTION = examination("friction", lambda effort: design.cases_of(_points(effort)), _examine)

@@ -8,8 +8,6 @@ from math import sqrt
 from operator import attrgetter
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from annelid.analysis import RhythmScore
 from annelid.config import field_value
 from annelid.experiment import Case, Store
@@ -60,8 +58,6 @@ MAPS: Mapping[Effort, Sequence[NoiseMap]] = {
         NoiseMap(RIGID, (0.005, 0.008, 0.010, 0.012, 0.015, 0.020, 0.030), (0.0, 0.001, 0.002, 0.005), 5),
     ),
 }
-AT_THE_PAPERS_STEP = {tolerance_m: Case(CHAIN, {"sensor.tolerance_m": tolerance_m}) for tolerance_m in (0.008, 0.012)}
-"""The chain at 1 ms, without noise, on both sides of the paper's tolerance."""
 NOISE_AT_THE_PAPERS_STEP_M = 0.002
 NOISY_AT_THE_PAPERS_STEP = [
     Case(CHAIN, {"sensor.noise_m": NOISE_AT_THE_PAPERS_STEP_M, "seed": seed}) for seed in range(3)
@@ -71,7 +67,7 @@ NOISY_AT_THE_PAPERS_STEP = [
 
 def _cases(effort: Effort) -> list[Case]:
     mapped = [case for chart in MAPS[effort] for cell in chart.cells().values() for case in cell]
-    return [*mapped, *AT_THE_PAPERS_STEP.values(), *NOISY_AT_THE_PAPERS_STEP] if effort == "full" else mapped
+    return [*mapped, *NOISY_AT_THE_PAPERS_STEP] if effort == "full" else mapped
 
 
 def is_even(score: RhythmScore) -> bool:
@@ -91,17 +87,11 @@ def handled_noise(cells: Cells, wanted: Callable[[RhythmScore], bool] = ONE_WAVE
     return max((noise for _, noise in cells if steady_tolerances(cells, noise, wanted)), default=None)
 
 
-def share(cells: Cells, wanted: Callable[[RhythmScore], bool] = ONE_WAVE) -> float:
-    """Returns the share of runs with the wanted rhythm, averaged over the cells."""
-    return float(np.mean([np.mean([wanted(score) for score in scores]) for scores in cells.values()]))
-
-
 class _Read(NamedTuple):
-    """A map with its runs, those of them in cells that all maps share, and the tolerances that need no luck, m."""
+    """A map with its runs, and the tolerances that need no luck, m."""
 
     chart: NoiseMap
     cells: Cells
-    compared: Cells
     window: Sequence[float]
     even_window: Sequence[float]
 
@@ -109,26 +99,14 @@ class _Read(NamedTuple):
     def worm(self) -> Worm:
         return self.chart.worm
 
-    @property
-    def breadth(self) -> float:
-        """How many times its lower end the upper end of the even window is; 0 where there is none."""
-        return max(self.even_window) / min(self.even_window) if self.even_window else 0.0
-
 
 def _examine(store: Store, effort: Effort) -> Findings:
     mapped = {
         chart: {place: [store[case].rhythm for case in cell] for place, cell in chart.cells().items()}
         for chart in MAPS[effort]
     }
-    common = sorted(set.intersection(*map(set, mapped.values())))
     maps = [
-        _Read(
-            chart,
-            cells,
-            {place: cells[place] for place in common} or cells,
-            steady_tolerances(cells, 0.0),
-            steady_tolerances(cells, 0.0, is_even),
-        )
+        _Read(chart, cells, steady_tolerances(cells, 0.0), steady_tolerances(cells, 0.0, is_even))
         for chart, cells in mapped.items()
     ]
     noisy_maps = [one for one in maps if max(one.chart.noises_m) > 0]
@@ -140,8 +118,6 @@ def _examine(store: Store, effort: Effort) -> Findings:
     found: dict[str, Any] = {
         "windows": words.by_worm(maps, lambda one: _in_mm(one.window)),
         "even_windows": words.by_worm(maps, lambda one: _in_mm(one.even_window)),
-        "fragility": _fragility_in_words(maps, bool(common)),
-        "breadths": words.by_worm((one for one in maps if one.even_window), lambda one: f"{one.breadth:.1f}"),
         "by_noise": "; ".join(map(_by_noise, noisy_maps)),
         **_of_sensor(max(noise for one in maps for noise in one.chart.noises_m)),
         "papers": PAPERS.label,
@@ -150,10 +126,6 @@ def _examine(store: Store, effort: Effort) -> Findings:
         noisy = [store[case].rhythm.is_one_wave for case in NOISY_AT_THE_PAPERS_STEP]
         numbers["walking_share_noisy_papers_step"] = sum(noisy) / len(noisy)
         found |= {
-            "quiet": words.listed(
-                f"at {MM * tolerance:g} mm {words.rhythm(store[case].rhythm)}"
-                for tolerance, case in AT_THE_PAPERS_STEP.items()
-            ),
             "noise_mm": MM * NOISE_AT_THE_PAPERS_STEP_M,
             "n_noisy": sum(noisy),
             "of_noisy": len(noisy),
@@ -167,7 +139,7 @@ def _examine(store: Store, effort: Effort) -> Findings:
         for one in maps
         for noise in one.chart.noises_m
     ]
-    remarks = ["breadths", "thresholds", "sensor", effort]
+    remarks = ["thresholds", "sensor", effort]
     return findings("noise", found, tabulated(rows, _COLUMNS), remarks, numbers)
 
 
@@ -198,26 +170,6 @@ _COLUMNS: Mapping[str, Callable[[_Row], str]] = {
 
 def _in_mm(lengths_m: Sequence[float]) -> str:
     return f"{words.listed(f'{MM * length:g}' for length in lengths_m)}{' mm' if lengths_m else ''}"
-
-
-def _fragility_in_words(maps: Sequence[_Read], in_common: bool) -> str:
-    where = f"the {len(maps[0].compared)} cells that the three maps share" if in_common else "each map's own cells"
-    walking = {one.worm: share(one.compared) for one in maps}
-    evenly = {one.worm: share(one.compared, is_even) for one in maps}
-    parts, even_parts = (
-        words.listed(f"{words.in_percent(value)} % ({worm.label})" for worm, value in of.items())
-        for of in (walking, evenly)
-    )
-    fact = f"Of the runs in {where}, {parts} walk, {even_parts} evenly."
-    if not in_common:
-        return fact
-    measures = (walking, evenly, {one.worm: one.breadth for one in maps})
-    wider = sum(measure[RIGID] > 1.05 * max(measure[PAPERS], measure[SOFT]) for measure in measures)
-    verdict = {
-        len(measures): "a good part of the loop's fragility is the soft crossings'",
-        0: "the loop's fragility is not that of the soft crossings",
-    }.get(wider, "the soft crossings are a part of the loop's fragility, though not by every measure")
-    return f"{fact} So {verdict}."
 
 
 def _by_noise(one: _Read) -> str:

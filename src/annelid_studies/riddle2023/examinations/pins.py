@@ -17,7 +17,7 @@ from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, SOFT, 
 from annelid_studies.riddle2023.examinations.ranges import compiled_ranges
 from annelid_studies.riddle2023.words import MM, PERCENT
 from annelid_studies.tables import tabulated
-from annelid_studies.worms import HOLD_S, TIGHT_CHAIN, Effort, chain, fast, one_after_the_other, rods
+from annelid_studies.worms import TIGHT_CHAIN, Effort, chain, fast, one_after_the_other, rods
 
 STIFFNESSES_N_PER_M = (12.0, 26.0, 50.0, 100.0, 300.0, 1000.0)
 """Ties of the rods; 25.5 N/m are the preset's."""
@@ -25,8 +25,6 @@ DAMPING_TIME_S = 0.04
 """Damping over stiffness of the ties, as the paper's pins have it, s."""
 TIME_CONSTANTS_S = (0.0126, 0.01, 0.008)
 """Of the chain's pin constraints, beside the paper's 0.02 s."""
-LONG_S = 3.0
-"""A contraction long enough to settle, s."""
 
 _FORMULATION = "body.formulation"
 _TIGHT = {f"{_FORMULATION}.{name}": value for name, value in TIGHT_CHAIN.items() if name != "kind"}
@@ -82,18 +80,12 @@ def _points(effort: Effort) -> list[Point]:
     return [*(Point(PAPERS, 0.0, hold=case) for case in chains), *sprung, Point(RIGID, 0.0, rods(), _HELD_TIGHT)]
 
 
-def _settling(effort: Effort) -> list[Case]:
-    """Rods with rigid crossings, segment 1 held contracted for long: the damping of soft crossings, and their own."""
-    long = one_after_the_other(1, hold_s=LONG_S)
-    return [case.but(long) for case in (_HELD_TIGHT, _OWN_DAMPING)] if effort == "full" else []
-
-
 def _examine(store: Store, effort: Effort) -> Findings:
     points = [one._replace(value=tie_stiffness_N_per_m(one.hold)) for one in _points(effort) if one.hold]
     readings = design.read(points, store)
     groups = design.by_worm(readings)
     chains, sprung, [tight] = groups[PAPERS], groups[SOFT], groups[RIGID]
-    paper, stiffest = chains[0], chains[-1]
+    paper = chains[0]
     paper_m, tight_m = paper.held_m[0], tight.held_m[0]
     own_m = design.held_elongation(store[_OWN_DAMPING])[0]
     walked = [one for one in sprung if one.walk]
@@ -122,20 +114,6 @@ def _examine(store: Store, effort: Effort) -> Findings:
         "own_beside": _beside(own_m, tight_m),
     }
     remarks = ["formulations", "closed_loop", "damping"]
-    if effort == "full":
-        settled, settled_own = (design.held_elongation(store[case])[0] for case in _settling(effort))
-        passes = abs(settled_own / settled - 1.0) < 0.5 * abs(own_m / tight_m - 1.0)
-        found |= {
-            "chains_stiffest": _rounded(stiffest.value),
-            "chains_most": stiffest.held_m[0],
-            "chains_beside": _beside(stiffest.held_m[0], tight_m),
-            "long_s": LONG_S,
-            "usual_s": HOLD_S,
-            "settled": settled,
-            "settled_own": settled_own,
-            "verdict": "passes; the readings are of meshes that still come to rest" if passes else "lasts",
-        }
-        remarks = ["formulations", "stiffest_chain", "closed_loop", "damping", "settled"]
     columns: Columns = {
         "worm": lambda one: one.worm.label,
         "tie (N/m)": lambda one: _rounded(one.value) if one is not tight else "rigid",
@@ -170,7 +148,7 @@ def _beside(value: float, reference: float) -> str:
 
 
 def _cases(effort: Effort) -> list[Case]:
-    return [*design.cases_of(_points(effort)), _OWN_DAMPING, *_settling(effort)]
+    return [*design.cases_of(_points(effort)), _OWN_DAMPING]
 
 
 PINS = examination("pins", _cases, _examine)

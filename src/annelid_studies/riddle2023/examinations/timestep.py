@@ -24,7 +24,6 @@ TRANSIENT_S = 0.1
 """How much of a contraction's beginning is resolved, s."""
 EARLY_S = 0.02
 """When the ring's length is compared with the muscle's limit, s."""
-PAPERS_STEP_MS = 1.0
 
 WALKS: Mapping[Effort, Mapping[Worm, Sequence[float]]] = {
     "quick": {PAPERS: (0.001, 0.002), SOFT: (0.010, 0.020), RIGID: (0.005, 0.010, 0.020)},
@@ -111,12 +110,6 @@ def _examine(store: Store, effort: Effort) -> Findings:
         reached = {step: start for step, start in row.items() if np.isfinite(start.at(EARLY_S))}
         factors = words.listed(words.in_unit(start.times_limit(EARLY_S), digits=1) for start in reached.values())
         early.append(f"{factors} times as far in {worm.label} at {_steps(reached)} ms")
-    largest = [
-        max((one for one in own if one.walks), key=lambda one: one.value, default=None) for own in own_walks.values()
-    ]
-    speeds = [
-        f"{words.in_unit(_speed(one))} times real time ({one.worm.label}, {one.value:g} ms)" for one in largest if one
-    ]
     columns: Columns = {
         "worm": lambda one: one.worm.label,
         "step, ms": lambda one: f"{one.value:g}",
@@ -125,18 +118,13 @@ def _examine(store: Store, effort: Effort) -> Findings:
         "first helix peak to peak (cm)": lambda one: words.all_in_cm(one.walked_helix_m),
         "mean of six springs (cm)": lambda one: words.all_in_cm(one.walked_m),
         "travel forwards (cm)": lambda one: words.in_cm(one.travel_m, 1),
-        "times real time": lambda one: words.in_unit(_speed(one)),
     }
-    lengths, papers_step = _settling_in_words(starts)
     found = {
         "walks": " ".join(map(_walks_in_words, own_walks.values())),
         "early": words.listed(early),
         "early_ms": MS * EARLY_S,
-        "lengths": lengths,
-        "papers_step": papers_step,
-        "speeds": words.listed(speeds),
     }
-    return findings("timestep", found, tabulated(walks, columns), ["lengths", "speeds"], numbers)
+    return findings("timestep", found, tabulated(walks, columns), numbers=numbers)
 
 
 def _steps(steps_ms: Iterable[float]) -> str:
@@ -150,11 +138,6 @@ def _verdict(one: Reading) -> str:
     return {"other order": "another wave", "too short": "too few contractions"}.get(kind, kind)
 
 
-def _speed(one: Reading) -> float | None:
-    """Simulated time over processor time; None where that is not known."""
-    return (one.closed.summary.duration_s or 0.0) / one.closed.cpu_time_s if one.closed.cpu_time_s else None
-
-
 def _walks_in_words(own: Sequence[Reading]) -> str:
     good = [one for one in own if one.walks]
     bad = words.listed(f"{one.value:g} ms ({_verdict(one)})" for one in own if not one.walks)
@@ -165,30 +148,6 @@ def _walks_in_words(own: Sequence[Reading]) -> str:
     return (
         f"{words.capitalised(own[0].worm.label)}: walks 1-2-3 at {_steps(one.value for one in good)} ms "
         f"(elongation of segment 1 within {mean} %, on its first helix within {helix} %) and fails at {bad}."
-    )
-
-
-def _settling_in_words(starts: Starts) -> tuple[str, str]:
-    """Lengths of the rings early and late in a contraction, and whether its beginning is converged at 1 ms."""
-
-    def lengths(row: Mapping[float, Start], time_s: float) -> str:
-        return words.listed(f"{words.in_unit(start.at(time_s))} m at {step:g} ms" for step, start in row.items())
-
-    listed = " ".join(
-        f"{words.capitalised(worm.label)}: ring of segment 1 {MS * EARLY_S:g} ms after the onset "
-        f"{lengths(row, EARLY_S)}; after {MS * TRANSIENT_S:g} ms {lengths(row, TRANSIENT_S)}."
-        for worm, row in starts.items()
-    )
-    paper = starts[PAPERS]
-    finest = paper[min(paper)].at(EARLY_S)
-    gap = paper[PAPERS_STEP_MS].at(EARLY_S) - finest
-    if abs(gap) <= 0.02 * finest:
-        return listed, f"At the paper's step of {PAPERS_STEP_MS:g} ms the beginning is converged within 2 %."
-    return listed, (
-        f"So at the paper's step of {PAPERS_STEP_MS:g} ms the beginning of a contraction is not converged: the "
-        f"ring is {words.in_cm(abs(gap), 0)} cm {'shorter' if gap < 0 else 'longer'} than at {min(paper):g} ms. "
-        "An explicit step holds the muscle's force while the light pins gather speed, and so misses the steep fall "
-        "of the force with velocity."
     )
 
 

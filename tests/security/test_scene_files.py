@@ -191,7 +191,7 @@ def picture(width: int, height: int, form: str = "PNG") -> bytes:
 BAD_FILES = {
     "mesh.obj": {
         "too long": b"#" * (MOST_FILE_BYTES + 1),
-        "long as text": b"v 0 0 0\n" * 300_000 + b"f 1 2 3\n",
+        "long as text": b"v .1 .1 .1\n" * 360_000 + b"f 1 2 3\n",
         "no numbers": b"v a b c\nf 1 2 3\n",
         "corner without vertex": OBJ.replace("3 1 4", "3 1 9").encode(),
         "corner before the first": OBJ.replace("3 1 4", "3 1 -9").encode(),

@@ -23,6 +23,7 @@ __all__ = [
     "read_json",
     "read_text",
     "read_toml",
+    "tag_of",
     "toml_text",
     "toml_value",
 ]

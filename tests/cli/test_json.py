@@ -217,7 +217,7 @@ def test_an_error_is_one_sentence_on_stderr_and_no_document(annelid: Command) ->
 
 
 def test_json_is_refused_beside_what_prints_something_else(annelid: Command) -> None:
-    for words in ("show RUN --verify", "presets wang", "arenas floor", "doctor --report", "sweep --example"):
+    for words in ("show RUN --verify", "presets wang", "arenas floor", "sweep --example"):
         done = annelid(*words.split(), "--json")
         assert (done.exit_code, done.out) == (entry.EXIT_USAGE, "")
         assert "does not go with" in " ".join(done.err.split())

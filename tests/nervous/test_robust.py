@@ -84,8 +84,10 @@ ADVERSARIES = ("on", "off", "telegraph", "noise", "swing", "while contracted", "
 
 
 @pytest.mark.parametrize("kind", ADVERSARIES)
-def test_one_wave_in_a_hundred_copies(kind: str) -> None:
-    n, n_copies = 3, 100
+@pytest.mark.parametrize(
+    ("n", "n_copies"), [(3, 100), *(pytest.param(n, 8, marks=pytest.mark.slow) for n in (8, 12, 24))]
+)
+def test_one_wave_in_all_copies(kind: str, n: int, n_copies: int) -> None:
     stepper, rng = stepper_of(n, n_copies), np.random.default_rng(1)
     state = stepper.initial_state()
     start = rng.uniform(-40.0, 60.0, state.potential.shape), rng.random(state.gate.shape)
@@ -167,16 +169,3 @@ def test_bad_parameters_are_refused(subtests: pytest.Subtests) -> None:
             replace(RobustParameters(), **change)
     with pytest.raises(ConfigError, match="n_segments must be at least 3, not 2"):
         robust_network(2)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", ADVERSARIES)
-@pytest.mark.parametrize("n", [8, 12, 24])
-def test_one_wave_in_long_worms(kind: str, n: int) -> None:
-    n_copies = 8
-    stepper, rng = stepper_of(n, n_copies), np.random.default_rng(n)
-    state = stepper.initial_state()
-    start = rng.uniform(-40.0, 60.0, state.potential.shape), rng.random(state.gate.shape)
-    trace = record(stepper, 4.3 * n * TURN_MS, adversary(kind, (n_copies, n), n), start)
-    for copy in range(n_copies):
-        assert_one_wave_in_time(trace[:, copy], n, 2 * n * TURN_MS)

@@ -167,8 +167,7 @@ def _instants(table: LogTable, log_map: LogMap) -> tuple[Array, np.ndarray]:
     if log_map.time not in table.names:
         offered = suggest(log_map.time, table.names)
         raise ConfigError(f"{table.path} has no column {shown(log_map.time)}: {offered}")
-    text = table.cells[log_map.time]
-    time_s = None if text.dtype.kind in "fiu" else clock_times(pandas.Series(text.astype(str)), table)
+    time_s = clock_times(log_map.time, table)
     if time_s is None:
         kind, factor = unit_of(log_map.time, log_map.time_unit or table.units.get(log_map.time), "time_unit")
         if kind != "s":
@@ -189,9 +188,12 @@ def _instants(table: LogTable, log_map: LogMap) -> tuple[Array, np.ndarray]:
     return time_s[dated], dated
 
 
-def clock_times(cells: pandas.Series, table: LogTable) -> Array | None:
-    """Dates and clocks as seconds since the first, NaN where there is none; None where most cells are neither."""
-    text = cells.str.strip().str.replace(",", ".", regex=False)
+def clock_times(name: str, table: LogTable) -> Array | None:
+    """Dates and clocks of a column as seconds since the first, NaN where there is none; None where most are neither."""
+    cells = table.cells[name]
+    if cells.dtype.kind in "fiu":
+        return None
+    text = pandas.Series(cells.astype(str)).str.strip().str.replace(",", ".", regex=False)
     if text.str.fullmatch(_CLOCK).mean() > 0.5:
         passed = pandas.to_timedelta(text.where(text.str.fullmatch(_CLOCK)))
         return passed.dt.total_seconds().to_numpy()

@@ -49,11 +49,9 @@ def proposed_map(path: Path) -> tuple[str, list[str]]:
     if time is not None:
         lines += [f"time = {_quoted(time)}"]
         unit, is_stated = _split_unit(time, table)[1:]
-        cells = table.cells[time]
-        is_clock = cells.dtype.kind not in "fiu" and clock_times(cells.astype(str), table) is not None
         if unit and not is_stated:
             lines += [f'time_unit = "{unit}"']
-        elif not unit and not is_clock:
+        elif not unit and clock_times(time, table) is None:
             lines += ['# time_unit = "s"   # s, ms, us or min: the log does not say']
             missing += ["time_unit, the unit of the time"]
     elif rate := _RATE.search(head):

@@ -109,7 +109,8 @@ def checked(text: str, rules: Rules = SCENE) -> str:
     grids = 0.0
     for element in root.iter():
         _check(element, rules)
-        grids += _grid(element)
+        sizes = [abs(number) for name in _GRIDS for number in numbers_of(element, name)]
+        grids += prod(sizes) if sizes else 0.0
     if any(name in element.attrib for element in root.iterfind(".//default/*") for name in _GRIDS):
         raise ConfigError(f"<default>: must not have {', '.join(_GRIDS)}; write them where they hold")
     if grids > MOST_SAMPLES:
@@ -238,12 +239,6 @@ def _check(element: ET.Element, rules: Rules) -> None:
             stated = f"<{element.tag} {shown(name)[1:-1]}={shown(element.get(name))}>"
             raise ConfigError(f"{stated}: {rules.what} cannot have this attribute")
         numbers_of(element, name)
-
-
-def _grid(element: ET.Element) -> float:
-    """Returns how many samples, pixels or numbers an element declares."""
-    sizes = [abs(number) for name in _GRIDS for number in numbers_of(element, name)]
-    return prod(sizes) if sizes else 0.0
 
 
 def _name_objects(root: ET.Element) -> None:

@@ -20,6 +20,7 @@ def test_a_program_that_is_no_ffmpeg_is_found_out(monkeypatch: pytest.MonkeyPatc
     line = finding("ffmpeg")
     assert line.startswith("missing")
     assert line.endswith("unset IMAGEIO_FFMPEG_EXE")
+    assert program not in line
 
 
 def test_an_engine_that_cannot_be_imported_is_a_finding(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -32,4 +33,4 @@ def test_an_engine_that_cannot_be_imported_is_a_finding(monkeypatch: pytest.Monk
     monkeypatch.setattr(sys, "meta_path", [Broken(), *sys.meta_path])
     line = finding("mujoco")
     assert line.startswith("missing")
-    assert line.endswith("no attribute 'glGetError': unset MUJOCO_GL")
+    assert line.endswith("cannot be imported (ArgumentError): unset MUJOCO_GL")

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import Annotated
 
 import typer
 
 from annelid.cli.common import ArenaName, Assignments, FidelityLevel, Preset, Segments, config_of, overrides_of
 from annelid.cli.entry import EXIT_USAGE, command
-from annelid.cli.json_output import give, refuse_json
+from annelid.cli.json_output import give
 
 
 @command("check", "Make")
@@ -41,27 +40,16 @@ def check(
 
 
 @command("doctor", "Help")
-def doctor(
-    report: Annotated[
-        bool, typer.Option("--report", help="Print versions and machine as Markdown, to paste into a bug report.")
-    ] = False,
-) -> None:
+def doctor() -> None:
     """Say what is missing and how to install it.
 
-    The report names no user, no machine and no folder.
+    It names no user, no machine and no folder, so that you can paste it into a bug report.
 
     \b
     annelid doctor
-    annelid doctor --report
     """
     from annelid.draw.doctor import examine
 
-    refuse_json(report, "--report")
-    if report:
-        from annelid.draw.doctor import bug_report
-
-        typer.echo(bug_report(list(examine())))
-        return
     found = list(examine())
     if not give([asdict(finding) for finding in found]):
         typer.echo("\n".join(finding.line() for finding in found))

@@ -1,6 +1,6 @@
-"""What a run and its pictures need, whether it is there, and the line that installs it; as a bug report, too.
+"""What a run and its pictures need, whether it is there, and the line that installs it.
 
-The report is Markdown that names no user, no machine and no folder.
+It names no user, no machine and no folder, so that it can be pasted into a bug report.
 """
 
 from __future__ import annotations
@@ -9,12 +9,12 @@ import os
 import platform
 import re
 import subprocess
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, requires, version
 from importlib.util import find_spec
 
-from annelid.draw.gl import BACK_ENDS, UNSET, candidates, find_backend, works
+from annelid.draw.gl import UNSET, candidates, find_backend, works
 from annelid.engine import REMEDY, mixed_engine
 from annelid.errors import RenderingUnavailable
 
@@ -46,7 +46,8 @@ class Finding:
 def examine() -> Iterator[Finding]:
     """Looks at Python, the engine, the packages, the OpenGL back-ends, ffmpeg and the extras, one at a time."""
     yield Finding("annelid", True, version("annelid"))
-    yield Finding("python", True, f"{platform.python_version()} on {platform.system()} {platform.machine()}")
+    machine = f"{platform.system()} {platform.release()} {platform.machine()}, {os.cpu_count()} cores"
+    yield Finding("python", True, f"{platform.python_version()} on {machine}")
     yield _engine()
     yield from (_package(package, f"pip install {package}") for package in _PACKAGES)
     yield from _back_ends()
@@ -62,7 +63,7 @@ def _engine() -> Finding:
         import mujoco
     except Exception as error:  # A back-end that MUJOCO_GL names fails in as many ways as there are libraries.
         remedy = "pip install 'mujoco-core[rendering]>=4.0.1'" if isinstance(error, ImportError) else UNSET
-        return Finding("mujoco", False, str(error).splitlines()[0], remedy)
+        return Finding("mujoco", False, f"cannot be imported ({type(error).__name__})", remedy)
     return Finding("mujoco", True, mujoco.__version__)
 
 
@@ -101,7 +102,7 @@ def _ffmpeg() -> Finding:
         return Finding("ffmpeg", False, "not found", remedy)
     except (IndexError, ValueError, subprocess.SubprocessError):
         pass
-    return Finding("ffmpeg", False, f"{imageio_ffmpeg.get_ffmpeg_exe()} is no ffmpeg", remedy)
+    return Finding("ffmpeg", False, "the program of that name is none", remedy)
 
 
 def _optional_packages() -> dict[str, str]:
@@ -114,22 +115,3 @@ def _optional_packages() -> dict[str, str]:
     smallest_last = sorted(extras, key=lambda extra: len(extras[extra]), reverse=True)
     remedies = {package: extra for extra in smallest_last for package in extras[extra]}
     return dict(sorted(remedies.items(), key=lambda remedy: (remedy[1], remedy[0])))
-
-
-def bug_report(findings: Sequence[Finding]) -> str:
-    """Returns what a bug report should say of a machine, as Markdown: versions, and what `examine` found.
-
-    What is wrong with a finding is left out, since it may name a folder.
-    """
-    backend = os.environ.get("MUJOCO_GL") or "not set"
-    named = sum(BACK_ENDS.values(), ("not set",))
-    facts = {
-        "annelid": version("annelid"),
-        "Python": f"{platform.python_version()} ({platform.python_implementation()})",
-        "system": f"{platform.system()} {platform.release()} {platform.machine()} {' '.join(platform.libc_ver())}",
-        "processor": f"{os.cpu_count()} logical cores",
-        "MUJOCO_GL": backend if backend in named else "set to something else than a back-end",
-    }
-    lines = [f"- {name}: {value}" for name, value in facts.items()]
-    rows = [f"| {each.item} | {each.state} | {each.detail if each.ok else ''} |" for each in findings]
-    return "\n".join([*lines, "", "| item | state | detail |", "|---|---|---|", *rows])

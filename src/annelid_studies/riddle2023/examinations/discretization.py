@@ -1,4 +1,4 @@
-"""Elements per rhombus side: what is converged in a held contraction and in the walk."""
+"""Elements per rhombus side: what is converged in a held contraction."""
 
 from __future__ import annotations
 
@@ -24,18 +24,14 @@ HELD: Mapping[Effort, Mapping[Worm, Sequence[int]]] = {
     "full": {RIGID: (1, 2, 3, 4, 6), PAPERS: (1, 2, 3, 4)},
 }
 """Elements a side with which each worm is held contracted, the finest last."""
-WALKED: Mapping[Effort, Sequence[int]] = {"quick": (1, 2, 3), "full": (1, 2, 3, 4, 6)}
-"""Elements a side with which rods with rigid crossings walk."""
 
 
 def _points(effort: Effort) -> list[Point]:
-    points = []
-    for worm, elements in HELD[effort].items():
-        for n in elements:
-            mesh = {"body.mesh.elements_per_side": n}
-            walk = worm.case(mesh) if worm is RIGID and n in WALKED[effort] else None
-            points.append(Point(worm, n, walk, worm.case({**mesh, **one_after_the_other()})))
-    return points
+    return [
+        Point(worm, n, None, worm.case({"body.mesh.elements_per_side": n, **one_after_the_other()}))
+        for worm, elements in HELD[effort].items()
+        for n in elements
+    ]
 
 
 def convergence_order(elements: ArrayLike, difference: ArrayLike, finest: float) -> float | None:
@@ -94,7 +90,6 @@ def _examine(store: Store, effort: Effort) -> Findings:
     readings = design.read(_points(effort), store)
     by_worm = design.by_worm(readings)
     held = [measure_convergence(own) for own in by_worm.values()]
-    walks = [one for one in readings if one.walk]
     first = held[0]
     numbers: dict[str, Number] = {}
     for found in held:
@@ -107,12 +102,9 @@ def _examine(store: Store, effort: Effort) -> Findings:
         "ring held (m)": lambda one: words.each_in_unit(one.at_holds("ring_length_m"), digits=3),
         "elongation held (cm)": lambda one: words.all_in_cm(one.held_m),
         "force held (N)": lambda one: words.each_in_unit(one.at_holds("force_N")),
-        "rhythm": lambda one: words.rhythm(one.rhythm) if one.walk else "not run",
-        "elongation walking (cm)": lambda one: words.all_in_cm(one.walked_m) if one.walk else "not run",
     }
     said: dict[str, Any] = {
         "held": " ".join(map(_convergence_in_words, held)),
-        "walk": _walks_in_words(walks),
         "worm": first.worm.label,
         "coarse": by_worm[first.worm][0].at_holds("ring_length_m"),
         "fewest": first.elements[0],
@@ -133,19 +125,6 @@ def _convergence_in_words(found: Convergence) -> str:
         f"Held contractions of {found.worm.label} with {PRESETS_ELEMENTS} elements a side differ from those with "
         f"{found.elements[-1]} by {_in_words(found.of_presets)}; the fitted order "
         f"of convergence is {words.span(orders, digits=1)}{slow}."
-    )
-
-
-def _walks_in_words(walks: Sequence[Reading]) -> str:
-    good = [one for one in walks if one.walks]
-    bad = [f"{one.value:g} ({words.rhythm(one.rhythm)})" for one in walks if not one.walks]
-    elongations = np.array([one.walked_m for one in good])
-    spread = float((np.ptp(elongations, axis=0) / elongations.mean(axis=0)).max()) if good else None
-    periods = [words.number(one.closed.rhythm.period_s) for one in good]
-    return (
-        f"In closed loop {RIGID.label} walk 1-2-3 with {words.listed(f'{one.value:g}' for one in good)} elements a "
-        f"side, elongations within {words.in_percent(spread)} % and periods of {words.span(periods, digits=3)} s, "
-        f"and fail with {words.listed(bad)}."
     )
 
 

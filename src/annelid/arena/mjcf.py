@@ -122,7 +122,8 @@ def checked_tree(root: ET.Element, rules: Rules) -> str:
     grids = 0.0
     for element in root.iter():
         _check(element, rules)
-        grids += _grid(element)
+        sizes = [abs(number) for name in _GRIDS for number in numbers_of(element, name)]
+        grids += prod(sizes) if sizes else 0.0
     defaults = (one for one in root.iterfind(".//default/*") if one.tag != "tendon")  # whose width is a look
     if any(name in element.attrib for element in defaults for name in _GRIDS):
         raise ConfigError(f"<default>: must not have {', '.join(_GRIDS)}; write them where they hold")
@@ -253,12 +254,6 @@ def _check(element: ET.Element, rules: Rules) -> None:
             stated = f"{tag_of(element)} {shown(name)[1:-1]}={shown(element.get(name))}>"
             raise ConfigError(f"{stated}: {rules.what} cannot have this attribute")
         numbers_of(element, name)
-
-
-def _grid(element: ET.Element) -> float:
-    """Returns how many samples, pixels or numbers an element declares."""
-    sizes = [abs(number) for name in _GRIDS for number in numbers_of(element, name)]
-    return prod(sizes) if sizes else 0.0
 
 
 def _name_objects(root: ET.Element) -> None:

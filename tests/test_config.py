@@ -21,6 +21,7 @@ from annelid.config import (
     field_value,
     fields_of,
     load_config,
+    load_study,
     loading,
     parse_assignments,
     preset_names,
@@ -210,7 +211,22 @@ def test_a_duration_becomes_the_nearest_whole_number_of_steps(duration_s: float,
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         config = load_config("riddle2023", {**clock, "record.frames_interval_s": step_s, "duration_s": duration_s})
-    assert config.duration_s == pytest.approx(max(round(duration_s / step_s), 1) * step_s, rel=1e-6)
+    assert config.duration_s == pytest.approx(max(round(duration_s / step_s), 1) * step_s, abs=1e-6 * duration_s)
+
+
+def test_what_a_file_extends_is_seen_from_its_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "worms").mkdir()
+    (tmp_path / "base.toml").write_text("[arena]\nfriction = 0.3\n")
+    (tmp_path / "worms" / "mine.toml").write_text('extends = "../base.toml"\nseed = 3\n')
+    (tmp_path / "worms" / "study.toml").write_text('preset = "mine.toml"\n[[vary]]\nfield = "seed"\nvalues = [1, 2]\n')
+    monkeypatch.chdir(tmp_path)
+    config = load_config(load_study("worms/study.toml").preset)
+    assert (config.name, config.seed) == ("mine", 3)
+    assert config.arena is not None
+    assert config.arena.friction == 0.3
+    (tmp_path / "worm.urdf").write_text("<robot/>")
+    with pytest.raises(ConfigError, match=r"worm.urdf is no configuration: a file ends in \.toml"):
+        load_config("worm.urdf")
 
 
 def test_a_changed_duration_is_said() -> None:

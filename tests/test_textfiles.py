@@ -10,17 +10,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from annelid import Network
 from annelid.config import load_config, parse_assignments, preset_names
 from annelid.errors import UnreadableText
-from annelid.nervous import Channel, GapJunction, Gate, Neuron, Synapse
 from annelid.textfiles import MOST_LEVELS, nested, parse_json, parse_toml, toml_text, toml_value
 
 # All that UTF-8 can hold: signs, blanks, quotes, worms, controls.
 TEXTS = st.text(st.characters(exclude_categories=["Cs"]), max_size=12)
 FLOATS = st.floats(allow_nan=False)
-FINITE = st.floats(allow_nan=False, allow_infinity=False)
-POSITIVE = st.floats(min_value=1e-300, max_value=1e300)
 SCALARS = st.one_of(TEXTS, FLOATS, st.integers(-(2**63), 2**63 - 1), st.booleans())
 VALUES = st.recursive(SCALARS, lambda inner: st.lists(inner, max_size=3) | st.dictionaries(TEXTS, inner, max_size=3))
 
@@ -65,39 +61,6 @@ def test_a_configuration_is_loaded_as_it_was_written(subtests: pytest.Subtests) 
             fields = {"body": config.body, "controller": config.controller, "duration_s": config.duration_s}
             words = [f"{path}={toml_value(value)}" for path, value in fields.items()]
             assert load_config(name, parse_assignments(words)) == load_config(name)
-
-
-neurons = st.builds(
-    Neuron,
-    capacitance_nF=POSITIVE,
-    rest_mV=FINITE,
-    bias_nA=FINITE,
-    channels=st.lists(
-        st.builds(Channel, POSITIVE, FINITE, st.lists(st.builds(Gate, FINITE, factor=POSITIVE), max_size=2).map(tuple)),
-        max_size=2,
-    ).map(tuple),
-)
-connections = st.one_of(
-    st.builds(Synapse, POSITIVE, FINITE),
-    st.builds(GapJunction, POSITIVE, st.booleans()),
-)
-
-
-@settings(max_examples=60)
-@given(st.data(), TEXTS, st.lists(TEXTS, min_size=1, max_size=3, unique=True))
-def test_a_network_is_read_as_it_was_written(data: st.DataObject, name: str, names: list[str]) -> None:
-    network = Network(name)
-    for each in names:
-        network.add_neuron(each, data.draw(neurons), data.draw(FINITE))
-        network.add_input(each, names[:1])
-        network.add_output(each, names[0])
-    for kind in data.draw(st.lists(connections, max_size=3)):
-        add = network.add_gap_junction if isinstance(kind, GapJunction) else network.add_synapse
-        add(names[0], names[-1], kind)  # type: ignore[arg-type]
-    read = Network.from_toml(network.to_toml())
-    for part in ("name", "neurons", "initial_mV", "connections", "inputs", "outputs"):
-        assert getattr(read, part) == getattr(network, part)
-    assert list(read.neurons) == names
 
 
 def test_fields_by_dotted_path_become_tables() -> None:

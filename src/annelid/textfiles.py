@@ -23,6 +23,7 @@ __all__ = [
     "read_json",
     "read_text",
     "read_toml",
+    "tag_of",
     "toml_text",
     "toml_value",
 ]
@@ -109,11 +110,20 @@ def _parsed(load: Callable[[str], Any], language: str, text: str, name: str) -> 
     return tree
 
 
+class _Element(ET.Element):
+    """An element that knows the line in which its start ends."""
+
+    line = 0
+
+
 class _XmlBuilder(ET.TreeBuilder):
     """Builds the tree of a text that is bounded in elements and depth and has no document type, hence no entities."""
 
+    line = 0
+    """The one that is being read."""
+
     def __init__(self, what: str, most_elements: int, most_levels: int) -> None:
-        super().__init__()
+        super().__init__(element_factory=_Element)
         self._what, self._most_elements, self._most_levels = what, most_elements, most_levels
         self._elements = self._level = 0
 
@@ -126,7 +136,10 @@ class _XmlBuilder(ET.TreeBuilder):
             raise ConfigError(f"has more than {self._most_elements:,} elements, the most of {self._what}")
         if self._level > self._most_levels:
             raise ConfigError(f"is nested deeper than {self._most_levels} levels, the most of {self._what}")
-        return super().start(tag, attrs)
+        element = super().start(tag, attrs)
+        assert isinstance(element, _Element)
+        element.line = self.line
+        return element
 
     def end(self, tag: str) -> ET.Element:
         self._level -= 1
@@ -139,12 +152,21 @@ def parse_xml(text: str | bytes, what: str, most_elements: int, most_levels: int
     Raises:
         ConfigError: It is no XML, has a document type, or more elements or levels than so many.
     """
-    parser = ET.XMLParser(target=_XmlBuilder(what, most_elements, most_levels))
+    builder = _XmlBuilder(what, most_elements, most_levels)
+    parser = ET.XMLParser(target=builder)
     try:
-        parser.feed(text)
+        # Line by line, so that elements know theirs. UTF-16 has its line feeds elsewhere.
+        for builder.line, line in enumerate(text.splitlines(keepends=True), start=1):
+            parser.feed(line)
         return parser.close()
     except (ET.ParseError, ValueError, LookupError) as error:
         raise ConfigError(f"is not valid XML: {shortened(str(error))}") from None
+
+
+def tag_of(element: ET.Element) -> str:
+    """Returns how an error names an element that `parse_xml` has read: its tag, after its line where that is known."""
+    line = getattr(element, "line", 0)
+    return f"line {line}: <{element.tag}" if line else f"<{element.tag}"
 
 
 def check_depth(tree: Any, name: str) -> None:

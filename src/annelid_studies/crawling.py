@@ -11,18 +11,16 @@ from math import isnan
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
-import numpy as np
 from rich.table import Table as TerminalTable
 
 from annelid.analysis import mean_and_interval
 from annelid.body import worm_of
 from annelid.config import load_config
-from annelid.draw import canvas, draw_lines, panel_title, save_both
 from annelid.errors import ConfigError
 from annelid.experiment import Case, Judged, Store, finer_steps, judge, more_elements
 from annelid.markdown import Table
 from annelid.output import write_csv
-from annelid_studies.tables import Results, grouped, terminal_table
+from annelid_studies.tables import Results, terminal_table
 from annelid_studies.worms import Effort, drawn_frictions
 
 GAITS = ("riddle2025-muscles", "crawler")
@@ -49,12 +47,6 @@ COLUMNS = {
     "cost_of_transport_cables": "the same, cables",
 }
 """Numbers of a gait that are written, with their heads in a table."""
-PANELS = {
-    "speed_body_lengths_per_s": "speed (body lengths/s)",
-    "cost_of_transport": "cost of transport",
-    "slip_ratio": "slip ratio",
-}
-"""Numbers of a gait that are drawn, with their labels."""
 
 
 class Reading(NamedTuple):
@@ -67,7 +59,7 @@ class Reading(NamedTuple):
 
     @property
     def name(self) -> str:
-        """What tables and figures call the gait."""
+        """What tables call the gait."""
         return Path(self.gait).name.removesuffix(".toml")
 
     def number(self, name: str) -> float | None:
@@ -133,8 +125,7 @@ def speed(store: Store, output: Path, effort: Effort, gaits: Sequence[str] | Non
     """The study `speed`, of `GAITS` or others."""
     readings = crawl(store, gaits or GAITS, effort)
     path = write_readings(readings, output / "speed.csv")
-    tables = [crawling_table(readings, quantity) for quantity in VALUES]
-    return (path, write_figure(readings, path.with_suffix(""))), tables
+    return (path,), [crawling_table(readings, quantity) for quantity in VALUES]
 
 
 def write_readings(readings: Sequence[Reading], path: Path) -> Path:
@@ -148,30 +139,6 @@ def crawling_table(readings: Sequence[Reading], quantity: Quantity) -> TerminalT
     rows = [[one.name, *one.cells] for one in readings if one.quantity == quantity]
     header = ["gait", LABELS[quantity], *COLUMNS.values(), "problem"]
     return terminal_table(Table(header, rows), f"Crawling, by {LABELS[quantity]}")
-
-
-def write_figure(readings: Sequence[Reading], stem: Path) -> Path:
-    """Draws a column for each quantity, and in it a panel for speed, cost of transport and slip, a line a gait.
-
-    A cross on the lower edge marks where a gait does not walk.
-    """
-    with canvas(7.0) as figure:
-        grid = figure.subplots(len(PANELS), len(VALUES), squeeze=False, sharex="col", sharey="row")
-        for letter, axes in zip("abcdefgh", grid.flat, strict=False):
-            panel_title(axes, f"{letter})")
-        for row, (name, label) in zip(grid, PANELS.items(), strict=True):
-            row[0].set_ylabel(label)
-            for axes, quantity in zip(row, VALUES, strict=True):
-                own = grouped((one for one in readings if one.quantity == quantity), lambda one: one.gait).values()
-                numbers = [np.array([one.number(name) for one in of], dtype=float) for of in own]
-                lines = {of[0].name: ([one.value for one in of], y) for of, y in zip(own, numbers, strict=True)}
-                draw_lines(axes, lines, markersize=4.0)
-            row[0].set_ylim(bottom=0.0)
-        for axes, quantity in zip(grid[-1], VALUES, strict=True):
-            axes.set_xlabel(LABELS[quantity])
-        handles, labels = grid[0, 0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
-        return save_both(figure, stem)
 
 
 class Headline(NamedTuple):

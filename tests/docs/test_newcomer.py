@@ -1,4 +1,4 @@
-"""Ten tasks of a newcomer, each with what one page says and nothing else, in an empty home and an empty folder."""
+"""Tasks of a newcomer, each with what one page says and nothing else, in an empty home and an empty folder."""
 
 from __future__ import annotations
 
@@ -59,18 +59,6 @@ TASKS = {
         python=True,
         gives=("first/run.nc", "lengths.png", "contracted.png"),
         prints="period",
-    ),
-    "the paper": Task("README.md", ("annelid paper --quick",), gives=("report/report.html",)),
-    "change N and friction": Task(
-        "docs/start.md",
-        ("annelid run riddle2023-rods --segments 4 --set arena.friction=0.3 --duration 6 -o slippery",),
-        gives=("slippery/run.nc", "slippery/figure7.png"),
-    ),
-    "own controller": Task(
-        "docs/tutorials/own_controller.md", python=True, gives=("runs/sns/run.nc",), prints="nervous system"
-    ),
-    "own network": Task(
-        "docs/tutorials/own_network.md", python=True, prints="ordered - a wave of 1 front from front to rear"
     ),
     "sweep and plot": Task(
         "docs/sweeps.md",

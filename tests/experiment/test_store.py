@@ -118,14 +118,6 @@ def test_a_run_that_a_guard_stops_is_an_outcome(tmp_path: Path) -> None:
     assert json.loads((tmp_path / OUTCOME_NAME).read_text())["message"]
 
 
-def test_results_of_another_machine_come_home(single: Store, tmp_path: Path) -> None:
-    there = Store(tmp_path / "there", Here("away"))
-    there.compute([planar()])
-    assert len(folders(there)) == 1
-    assert there.run(planar()).data.drop_vars("wall_time").equals(single.run(planar()).data.drop_vars("wall_time"))
-    assert there[planar()].rhythm == single[planar()].rhythm
-
-
 @pytest.mark.parametrize("script", [[], ["away"]])
 def test_a_store_may_keep_the_numbers_only(tmp_path: Path, script: list[str]) -> None:
     store = Store(tmp_path, Here(*script), keep="outcomes")

@@ -186,20 +186,6 @@ def quantity(
     return Quantity("elongation_mean_max_m.1", value, parameters, time_step, elements, 8)
 
 
-def test_what_is_wrong_with_a_quantity_is_said_in_words(subtests: pytest.Subtests) -> None:
-    for of_it, converged, note in (
-        ((1.0, 9.0, 0.5, 0.5), True, ""),
-        ((-1.0, 0.0, 0.51, 0.0), False, "not converged: time step"),
-        ((1.0, 0.0, 2.0, 2.0), False, "not converged: time step and elements"),
-        ((1.0, None, 0.0, 0.6), False, "not converged: elements; without parameters"),
-        ((1.0, 0.1, None, 0.1), None, "without time step"),
-        ((None, 0.1, None, None), None, "not known from this run"),
-    ):
-        with subtests.test(f"{of_it!r:.60}"):
-            found = quantity(*of_it)
-            assert (found.converged, found.note) == (converged, note)
-
-
 def test_values_are_written_to_two_digits_of_their_error() -> None:
     assert str(quantity(0.0615, 0.0021, 0.0, 0.0)) == "6.15 +- 0.21 cm"
     assert str(quantity(-0.1159, 0.117, 0.0, 0.0)) == "-12 +- 12 cm"

@@ -151,6 +151,34 @@ def test_a_cable_of_mujoco_3_sags_as_a_beam(tmp_path: Path) -> None:
     assert 1.0 - tip_m[2] == pytest.approx(mass_kg * 9.81 * free_m**4 / (8 * bending), rel=0.01)
 
 
+def test_a_coil_of_mujoco_3_has_its_places_and_its_sites(tmp_path: Path) -> None:
+    """Its curve is a helix: 1.5 turns of 0.2 m radius over a metre, from its first site to its last."""
+    (tmp_path / "coil.xml").write_text(
+        '<mujoco><compiler autolimits="true"/><worldbody>'
+        '<composite type="cable" prefix="w" curve="cos(s) sin(s) s" count="31 1 1" size="1 0.2 3" initial="free"/>'
+        '</worldbody><tendon><spatial name="stretch_1"><site site="wS_first"/><site site="wS_last"/></spatial></tendon>'
+        '<actuator><motor name="ring_1" tendon="stretch_1" ctrlrange="-1 0"/></actuator></mujoco>'
+    )
+    plant = plant_of(load_config(tmp_path / "coil.xml"))
+    share = np.arange(30) / 30
+    helix_m = np.stack([0.2 * np.cos(3 * np.pi * share), 0.2 * np.sin(3 * np.pi * share), share], axis=1)
+    places_m = [plant.data.body(f"wB_{name}").xpos for name in ("first", *range(1, 29), "last")]
+    np.testing.assert_allclose(places_m, helix_m, atol=1e-8)
+    np.testing.assert_allclose(plant.data.site("wS_last").xpos, [-0.2, 0.0, 1.0], atol=1e-8)
+
+
+@pytest.mark.parametrize(
+    "actuator",
+    [
+        '<velocity name="ring_1" joint="s" ctrlrange="-0.1 0.1" kv="50"/>',
+        '<intvelocity name="ring_1" joint="s" ctrlrange="-0.1 0.1" kp="500" actrange="-0.02 0.02"/>',
+    ],
+)
+def test_a_speed_as_command_shortens_when_contracted(actuator: str) -> None:
+    plant = plant_of(robot(one_motor(actuator)))
+    assert held(plant, 1.0, 100).stretch_m[0, 0] < held(plant, 0.0, 100).stretch_m[0, 0] - 0.005
+
+
 REFUSED = {
     "no segment": (
         EXAMPLE,
@@ -165,7 +193,6 @@ REFUSED = {
         "no actuator named ring_1; it has none",
     ),
     "busy engine": ('<mujoco><option iterations="1000000"/></mujoco>', {}, "at most 10000"),
-    "speed as command": (EXAMPLE.replace("<position name", "<velocity name"), {}, "use general, motor, position"),
 }
 
 
@@ -183,6 +210,7 @@ def test_what_no_robot_can_have_is_refused_in_a_sentence(subtests: pytest.Subtes
         (one_motor('<motor name="ring_1" joint="s"/>'), "'ring_1' has no ctrlrange"),
         (one_motor('<motor name="ring_1" joint="s" ctrlrange="0 1"/>'), "'ring_1' cannot pull"),
         (one_motor('<motor name="ring_1" joint="t" ctrlrange="0 1"/>'), "the engine refuses the robot: .*unknown"),
+        (one_motor('<damper name="ring_1" joint="s" ctrlrange="0 1"/>'), "'ring_1' cannot pull"),
     ],
 )
 def test_an_actuator_that_is_no_ring_is_refused(xml: str, words: str) -> None:
@@ -210,6 +238,38 @@ def test_a_composite_that_is_no_cable_is_refused(subtests: pytest.Subtests, tmp_
             (folder / "c.xml").write_text(f"<mujoco><worldbody>{FLOOR}{text}</worldbody></mujoco>")
             with pytest.raises(ConfigError, match=words):
                 load_config(folder / "c.xml")
+
+
+def test_what_a_robot_includes_is_read_from_its_folder(tmp_path: Path) -> None:
+    whole = load_config(ROBOT)
+    parts = ROBOT.read_text()
+    start, end = parts.index("<actuator>"), parts.index("</actuator>") + len("</actuator>")
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "parts" / "motors.xml").write_text(f"<mujocoinclude>{parts[start:end]}</mujocoinclude>")
+    robot_file = tmp_path / "robot.xml"
+    robot_file.write_text(f'{parts[:start]}<include file="parts\\motors.xml"/>{parts[end:]}')
+    assert load_config(robot_file).body == whole.body
+    outside = tmp_path.parent / f"{tmp_path.name}.xml"
+    outside.write_text("<mujocoinclude/>")
+    for file in (f"../{outside.name}", str(outside), "robot.xml", "parts/none.xml"):
+        robot_file.write_text(f'<mujoco><include file="{file}"/></mujoco>')
+        with pytest.raises(ConfigError, match=r"below the folder|included twice|cannot read"):
+            load_config(robot_file)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("<mujoco>\n<worldbody>\n<flexcomp/></worldbody></mujoco>", "line 3: <flexcomp>.*write its bodies out"),
+        ('<mujoco>\n<worldbody>\n<composite type="cable" count="2"/></worldbody></mujoco>', "line 3: .*needs vertex="),
+        ('<robot name="worm"/>', "this is URDF; load it in MuJoCo and save it"),
+        ('<Lems><include file="Cells.xml"/></Lems>', "a network of NeuroML; write it as TOML"),
+    ],
+)
+def test_what_is_no_robot_is_refused_with_its_line_and_what_to_do(text: str, words: str, tmp_path: Path) -> None:
+    (tmp_path / "robot.xml").write_text(text)
+    with pytest.raises(ConfigError, match=words):
+        load_config(tmp_path / "robot.xml")
 
 
 def test_the_section_has_its_own_ground() -> None:

@@ -98,7 +98,8 @@ def test_a_file_a_configuration_and_a_run_file_are_refused_for_what_a_scene_cann
     for name, (text, reason) in (ANYWHERE | IN_A_SCENE).items():
         with subtests.test(name):
             path.write_text(text, encoding="utf-8")
-            assert reason in refusal(path)
+            # A file may include others of its folder, a text in a configuration none.
+            assert reason in refusal(path) or (name.startswith("include") and "xml" in refusal(path))
             with pytest.raises(ConfigError, match=r"arena\.xml"):
                 load_config("crawler", {"arena": {"kind": "scene", "xml": text}})
             with pytest.raises(ValueError, match=r"arena\.xml"):
@@ -190,7 +191,7 @@ def picture(width: int, height: int, form: str = "PNG") -> bytes:
 BAD_FILES = {
     "mesh.obj": {
         "too long": b"#" * (MOST_FILE_BYTES + 1),
-        "long as text": b"v 0 0 0\n" * 300_000 + b"f 1 2 3\n",
+        "long as text": b"v .1 .1 .1\n" * 360_000 + b"f 1 2 3\n",
         "no numbers": b"v a b c\nf 1 2 3\n",
         "corner without vertex": OBJ.replace("3 1 4", "3 1 9").encode(),
         "corner before the first": OBJ.replace("3 1 4", "3 1 -9").encode(),

@@ -110,13 +110,6 @@ def test_an_entrant_that_was_tuned_on_tests_or_changes_the_task_is_refused(
                 find_entrants([str(folder / "mine.toml")])
 
 
-def test_unknown_names_are_refused_with_the_nearest() -> None:
-    with pytest.raises(ConfigError, match="did you mean 'sine'"):
-        find_entrants(["sin"])
-    with pytest.raises(ConfigError, match="did you mean 'slope'"):
-        entries(find_entrants(["sine"]), ["slop"], [0])
-
-
 def test_a_file_enters_beside_the_reference(tmp_path: Path) -> None:
     (tmp_path / "mine.toml").write_text("[mine]\ncontroller.kind = 'sine'\nper_segment.period_s = 0.5\ntuned_on = [1]")
     found = find_entrants([str(tmp_path / "mine.toml")])

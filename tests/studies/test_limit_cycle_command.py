@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
 import pytest
 
@@ -24,7 +23,6 @@ def test_json_holds_the_numbers_and_nothing_else(annelid: Command) -> None:
         (("riddle2023-rods",), "choose the body riddle2022"),
         (("--set", "sensor.noise_m=0.001"), "set sensor.noise_m=0"),
         (("--neuron", "contractoin_1"), "did you mean 'contraction_1'"),
-        (("-o", "cycle.txt"), "must end in .png, .pdf, .svg"),
         (("--segments", "2"), "at least 3"),
     ],
 )
@@ -32,10 +30,3 @@ def test_bad_input_ends_in_one_sentence(annelid: Command, arguments: tuple[str, 
     done = annelid("study", "limit-cycle", *arguments)
     assert done.exit_code == 2
     assert says in done.sentence()
-    assert not list(Path().iterdir())
-
-
-def test_a_picture_is_kept_unless_forced(annelid: Command) -> None:
-    Path("cycle.png").write_text("mine")
-    assert "cycle.png exists" in annelid("study", "limit-cycle", "-o", "cycle.png").sentence()
-    assert Path("cycle.png").read_text() == "mine"

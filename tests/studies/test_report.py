@@ -172,15 +172,6 @@ def test_the_page_needs_nothing_else(html: Reading, pictures: Path) -> None:
         assert str(pictures) not in (pictures / name).read_text(encoding="utf-8")
 
 
-def test_contents_lead_to_every_part(both: Reading) -> None:
-    links = both.attributes("a", "href")
-    assert (
-        len(links)
-        == len(set(links))
-        == len([text for text in both.texts["h2"] if text != "Contents"]) + len(both.texts["h3"])
-    )
-
-
 def test_links_of_the_page_have_their_target(html: Reading) -> None:
     targets = [name for tag in ("h2", "div") for name in html.attributes(tag, "id")]
     assert sorted(html.attributes("a", "href")) == sorted(f"#{name}" for name in targets)

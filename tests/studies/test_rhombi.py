@@ -1,16 +1,9 @@
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
-import xarray
 
-from annelid.analysis import nearest_frame
-from annelid.config import load_config
-from annelid.errors import RunFileError
 from annelid.morphology import MeshGeometry, helical_mesh
-from annelid.simulation.runfile import Run
 from annelid_studies.riddle2023.figures.rhombi import (
     actuated,
     deformation,
@@ -81,36 +74,3 @@ def test_actuated_rhombi_are_those_that_a_ring_runs_across(mesh: MeshGeometry) -
     for segment in range(mesh.n_segments):
         own = rhombus_plane(mesh) == mesh.ring_planes[segment]
         np.testing.assert_array_equal(distance_from_ring_m(mesh, segment)[own], 0.0)
-
-
-@pytest.fixture
-def recorded() -> tuple[Run, MeshGeometry]:
-    """Three postures 0.1 s apart: at rest, twice and three times as long."""
-    mesh = helical_mesh(3)
-    positions = np.stack([mesh.crossings_m * [k, 1.0, 1.0] for k in (1.0, 2.0, 3.0)])
-    data = xarray.Dataset(
-        {
-            "crossing_position": (("frame", "crossing", "axis"), positions),
-            "frame_time": ("frame", [0.0, 0.1, 0.2]),
-        }
-    )
-    return Run(Path("run.nc"), data, load_config("riddle2023-rods"), "complete", ""), mesh
-
-
-def test_a_run_is_measured_over_time_and_at_a_time(recorded: tuple[Run, MeshGeometry]) -> None:
-    run, mesh = recorded
-    over_time = deformation(run.data["crossing_position"].values, mesh)
-    assert over_time.axial.shape == (3, len(mesh.rhombi))
-    np.testing.assert_allclose(plane_means(over_time.axial, mesh)[:, 0], [0.0, 1.0, 2.0], atol=1e-12)
-    assert nearest_frame(run, 0.14) == 1
-
-
-def test_times_and_runs_without_postures_are_refused(recorded: tuple[Run, MeshGeometry]) -> None:
-    run, _ = recorded
-    with pytest.raises(RunFileError, match=r"no picture at 1\.5 s: it was recorded from 0 to 0\.2 s"):
-        nearest_frame(run, 1.5)
-    empty = Run(run.path, run.data.isel(frame=slice(0)), run.config, run.status, "")
-    planar = Run(run.path, run.data.drop_vars("crossing_position"), run.config, run.status, "")
-    for poor in (empty, planar):
-        with pytest.raises(RunFileError, match="no recorded postures"):
-            nearest_frame(poor, 0.1)

@@ -14,9 +14,9 @@ from dataclasses import dataclass, field
 from math import isfinite, prod
 
 from annelid.errors import ConfigError, shown
-from annelid.textfiles import parse_xml
+from annelid.textfiles import parse_xml, tag_of
 
-MOST_BYTES = 1_000_000
+MOST_BYTES = 4_000_000
 """Of a text, with all that its file took from others."""
 MOST_SAMPLES = 4_000_000
 """Of all height fields, textures and other grids of a text together."""
@@ -40,6 +40,13 @@ _REFUSED = {
     "replicate": "write out what it repeats",
 }
 """Elements that no text can have, and what to do instead."""
+_NEUROML = "this is a network of NeuroML; write it as TOML (annelid export-network PRESET --to toml shows the form)"
+_FOREIGN = {
+    "robot": "this is URDF; load it in MuJoCo and save it as MJCF, which begins with <mujoco>",
+    "Lems": _NEUROML,
+    "neuroml": _NEUROML,
+}
+"""Root elements of what is no MJCF, and what to do with it."""
 _LENGTHRANGE = frozenset(["mode", "useexisting", "uselimit", "tolrange"])
 _UNREAD = re.compile(r"[+-]?(0x[0-9a-f.]|nan\()", re.IGNORECASE)
 """Begins a number that the engine reads and Python does not, which would pass every limit."""
@@ -68,7 +75,7 @@ class Rules:
 
 SCENE = Rules(
     "a scene",
-    2_000,
+    20_000,
     24,
     _REFUSED
     | {
@@ -84,13 +91,11 @@ SCENE = Rules(
     _LOOKS,
     {"compiler": frozenset(["angle", "eulerseq", "autolimits"]), "lengthrange": frozenset()},
 )
-_DRIVEN = "use general, motor, position or muscle"
-_UNDRIVEN = ("velocity", "intvelocity", "damper", "cylinder", "adhesion", "orientation", "pid", "dcmotor")
 ROBOT = Rules(
     "a robot",
     20_000,
     200,
-    _REFUSED | dict.fromkeys(_UNDRIVEN, _DRIVEN),
+    _REFUSED,
     _LOOKS | {"keyframe"},
     {"lengthrange": _LENGTHRANGE},
 )
@@ -104,13 +109,23 @@ def checked(text: str, rules: Rules = SCENE) -> str:
     """
     if len(text) > MOST_BYTES:
         raise ConfigError(f"is too long: {rules.what} has at most {MOST_BYTES / 1e6:g} MB of text, meshes included")
-    root = parsed(text, rules)
+    return checked_tree(parsed(text, rules), rules)
+
+
+def checked_tree(root: ET.Element, rules: Rules) -> str:
+    """Does what `checked` does for a text that is `parsed`, whose errors name the lines of its file.
+
+    Raises:
+        ConfigError: It has an element, an attribute or an amount that it cannot have.
+    """
     _leave_out(root, rules)
     grids = 0.0
     for element in root.iter():
         _check(element, rules)
-        grids += _grid(element)
-    if any(name in element.attrib for element in root.iterfind(".//default/*") for name in _GRIDS):
+        sizes = [abs(number) for name in _GRIDS for number in numbers_of(element, name)]
+        grids += prod(sizes) if sizes else 0.0
+    defaults = (one for one in root.iterfind(".//default/*") if one.tag != "tendon")  # whose width is a look
+    if any(name in element.attrib for element in defaults for name in _GRIDS):
         raise ConfigError(f"<default>: must not have {', '.join(_GRIDS)}; write them where they hold")
     if grids > MOST_SAMPLES:
         raise ConfigError(f"has grids and textures of {grids:,.0f} samples: at most {MOST_SAMPLES:,} are read")
@@ -126,8 +141,9 @@ def parsed(text: str | bytes, rules: Rules) -> ET.Element:
         ConfigError: It is no XML, has a document type, too many or too deep elements, or another root.
     """
     root = parse_xml(text, rules.what, rules.most_elements, rules.most_levels)
-    if root.tag != "mujoco":
-        raise ConfigError(f"begins with <{shown(root.tag)[1:-1]}>: an MJCF file begins with <mujoco>")
+    if root.tag not in ("mujoco", "mujocoinclude"):
+        remedy = _FOREIGN.get(root.tag.rpartition("}")[2], "an MJCF file begins with <mujoco>")
+        raise ConfigError(f"begins with <{shown(root.tag)[1:-1]}>: {remedy}")
     return root
 
 
@@ -205,14 +221,14 @@ def numbers_of(element: ET.Element, name: str) -> list[float]:
     numbers = []
     for word in element.get(name, "").split():
         if _UNREAD.match(word):
-            raise ConfigError(f"<{element.tag} {name}={shown(element.get(name))}>: write {shown(word)} in decimals")
+            raise ConfigError(f"{tag_of(element)} {name}={shown(element.get(name))}>: write {shown(word)} in decimals")
         try:
             numbers.append(float(word))
         except ValueError:
             continue
         if not isfinite(numbers[-1]) or abs(numbers[-1]) > largest:
             raise ConfigError(
-                f"<{element.tag} {name}={shown(element.get(name))}>: numbers must be finite and at most {largest:g}"
+                f"{tag_of(element)} {name}={shown(element.get(name))}>: numbers must be finite and at most {largest:g}"
             )
     return numbers
 
@@ -231,19 +247,13 @@ def _check(element: ET.Element, rules: Rules) -> None:
     # What stands between the elements means nothing to the engine.
     element.text = element.tail = None
     if element.tag in rules.refused:
-        raise ConfigError(f"<{element.tag}>: {rules.what} cannot have it; {rules.refused[element.tag]}")
+        raise ConfigError(f"{tag_of(element)}>: {rules.what} cannot have it; {rules.refused[element.tag]}")
     valid = rules.attributes.get(element.tag, element.attrib.keys())
     for name in element.attrib:
         if name.startswith("file") or (element.tag, name) == ("mesh", "builtin") or name not in valid:
-            stated = f"<{element.tag} {shown(name)[1:-1]}={shown(element.get(name))}>"
+            stated = f"{tag_of(element)} {shown(name)[1:-1]}={shown(element.get(name))}>"
             raise ConfigError(f"{stated}: {rules.what} cannot have this attribute")
         numbers_of(element, name)
-
-
-def _grid(element: ET.Element) -> float:
-    """Returns how many samples, pixels or numbers an element declares."""
-    sizes = [abs(number) for name in _GRIDS for number in numbers_of(element, name)]
-    return prod(sizes) if sizes else 0.0
 
 
 def _name_objects(root: ET.Element) -> None:

@@ -1,4 +1,4 @@
-"""Reads an MJCF file with the meshes and pictures that it names, as one text without references.
+"""Reads an MJCF file with the files that it includes, and the meshes and pictures it names, as one text.
 
 annelid reads the files, of bounded size, from the folder of the MJCF file or below; the engine opens none.
 """
@@ -14,15 +14,17 @@ from pathlib import Path, PurePosixPath
 import numpy as np
 from numpy.typing import NDArray
 
-from annelid.arena.mjcf import MOST_BYTES, SCENE, Rules, checked, parsed
+from annelid.arena.mjcf import MOST_BYTES, SCENE, Rules, checked, checked_tree, parsed
 from annelid.errors import ConfigError, shortened, shown
 from annelid.protocols import Array
 from annelid.text import is_line
-from annelid.textfiles import read_bytes
+from annelid.textfiles import read_bytes, tag_of
 
 MOST_FILE_BYTES = 4_000_000
 """Of a mesh or a picture."""
 MOST_PIXELS = 250_000
+MOST_INCLUDED = 50
+"""Files that a text is made of."""
 _SUFFIXES = {"mesh": (".obj", ".stl"), "hfield": (".png",)}
 _FOLDERS = ("meshdir", "assetdir")
 
@@ -41,15 +43,37 @@ def read_mjcf(path: Path, rules: Rules = SCENE, rewrite: Callable[[ET.Element], 
     content = read_bytes(path, f"the file of {rules.what}", MOST_BYTES)
     try:
         root = parsed(content, rules)
+        _include(root, path.parent, rules, [path.resolve()])
         folder = _take_folder(root)
         if rewrite is not None:
             rewrite(root)
         for element in root.iterfind("asset/*"):
             if element.tag in _SUFFIXES and "file" in element.attrib:
                 _write_in(element, path.parent, folder)
-        return checked(ET.tostring(root, encoding="unicode"), rules)
+        return checked(checked_tree(root, rules), rules)
     except ConfigError as error:
         raise ConfigError(f"{path}: {error}") from None
+
+
+def _include(root: ET.Element, beside: Path, rules: Rules, read: list[Path]) -> None:
+    """Puts the content of included files where a text includes them; each is read once, as by the engine."""
+    for parent in list(root.iter()):
+        for place, child in reversed([*enumerate(parent)]):
+            if child.tag != "include":
+                continue
+            given = child.get("file", "")
+            path = _inside(beside, PurePosixPath(), given, (".xml", ".mjcf"))
+            if path.resolve() in read or len(read) > MOST_INCLUDED:
+                raise ConfigError(
+                    f"{tag_of(child)} file={shown(given)}>: is included twice, or after {MOST_INCLUDED} others"
+                )
+            read.append(path.resolve())
+            try:
+                content = parsed(read_bytes(path, "an included file", MOST_BYTES), rules)
+                _include(content, beside, rules, read)
+            except ConfigError as error:
+                raise ConfigError(f"{path.name}: {error}") from None
+            parent[place : place + 1] = list(content)
 
 
 def _take_folder(root: ET.Element) -> PurePosixPath:
@@ -79,10 +103,11 @@ def _write_in(element: ET.Element, beside: Path, folder: PurePosixPath) -> None:
 
 def _inside(beside: Path, folder: PurePosixPath, given: str, suffixes: tuple[str, ...]) -> Path:
     """Returns the path of a file that lies beside the scene's or below it, wherever links lead."""
-    name = folder / given
+    # Windows' separators; its absolute paths have a colon.
+    name = folder / (given.replace("\\", "/").lstrip("/") if "\\" in given else given)
     refused = f"file={shown(given)}: must be a relative path below the folder of the scene"
-    if not is_line(str(name)) or name.is_absolute() or ".." in name.parts or "\\" in str(name) or ":" in str(name):
-        raise ConfigError(f"{refused}, with '/' and without '..'")
+    if not is_line(str(name)) or name.is_absolute() or ".." in name.parts or ":" in str(name):
+        raise ConfigError(f"{refused}, without '..'")
     if name.suffix.lower() not in suffixes:
         raise ConfigError(f"file={shown(given)}: must end in {' or '.join(suffixes)}")
     path = beside / name

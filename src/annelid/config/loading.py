@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from importlib import resources
 from importlib.resources.abc import Traversable
+from os.path import isfile
 from pathlib import Path
 from typing import Any
 
@@ -91,6 +92,8 @@ def _files(folder: str) -> dict[str, Traversable]:
 
 def _text(folder: str, what: str, name: str) -> str:
     files = _files(folder)
+    if name not in files and Path(name).suffix and isfile(name):
+        raise ConfigError(f"{name} is no configuration: a file ends in .toml, a robot or a scene as MJCF in .xml")
     if name not in files:
         raise ConfigError(f"unknown {what} {shown(name)}: {suggest(name, files)}")
     return files[name].read_text(encoding="utf-8")
@@ -213,7 +216,7 @@ def _layers(
     source: str | Path | Mapping[str, Any], above: tuple[Path, ...] = ()
 ) -> list[tuple[str, str, Mapping[str, Any]]]:
     """Returns name, text and fields of a source and of each that it extends, the outermost first."""
-    default = None
+    default, folder = None, None
     if isinstance(source, Mapping):
         check_depth(source, "the configuration")
         name, text, own = "", "", dict(source)
@@ -222,6 +225,7 @@ def _layers(
         return [(path.name, "", {"name": path.stem, **reader.from_file(path)})]
     elif isinstance(source, Path) or str(source).endswith(".toml"):
         path = Path(source)
+        folder = path.parent
         # Without line breaks, so that it stands in a comment.
         name, text = shown(path.name), read_text(path, "the configuration file")
         own = parse_toml(text, str(path))
@@ -244,7 +248,13 @@ def _layers(
         return [(name, text, own)]
     if not isinstance(base, str):
         raise ConfigError(f"extends = {shown(base)}: must be the name of a preset or of a TOML or MJCF file")
-    return [*_layers(base, above), (name, text, own)]
+    return [*_layers(base if folder is None else seen_from(folder, base), above), (name, text, own)]
+
+
+def seen_from(folder: Path, source: str) -> str:
+    """Returns a preset's name as it is, and the path of a file as it is seen from a folder."""
+    is_file = source.endswith(".toml") or kind_of_file(BodyKind, source) is not None
+    return str(folder / source) if is_file else source
 
 
 def _kinds_first(override: tuple[str, Any]) -> float:

@@ -429,7 +429,7 @@ class RunConfig(Section):
             whole = float(f"{max(round(self.duration_s / step), 1) * step:.9g}")
             was = f"duration_s = {self.duration_s:g}"
             warnings.warn(f"{was} is taken as {whole:g}, a whole number of control steps", stacklevel=2)
-            self.__dict__["duration_s"] = whole  # The section is frozen.
+            object.__setattr__(self, "duration_s", whole)  # The section is frozen.
         for field, value in (
             ("record.signals_interval_s", self.record.signals_interval_s),
             ("record.frames_interval_s", self.record.frames_interval_s),

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, model_validator
 
 from annelid.config.checking import check_section
+from annelid.config.loading import seen_from
 from annelid.config.sections import Line, Section, Seed
 from annelid.errors import ConfigError, shown
 from annelid.textfiles import check_depth, read_toml
@@ -62,7 +63,7 @@ class Study(Section):
     """A sweep over fields of a configuration."""
 
     name: Line = Field(default="sweep", max_length=200, description="for titles")
-    preset: str = Field(description="name of a preset, or a TOML file")
+    preset: str = Field(description="name of a preset, or a TOML file, seen from the folder of this one")
     set: Mapping[str, Any] = Field(default_factory=dict, description="fields that are the same in every run")
     vary: Annotated[tuple[Vary, ...], Field(min_length=1)] = Field(description="the fields that are varied")
     design: Design = Field(default="grid", description="every combination, or samples of the ranges")
@@ -113,6 +114,8 @@ def load_study(source: str | Path | Mapping[str, Any] | Study) -> Study:
         tree = source
     else:
         tree = {"name": Path(source).stem, **read_toml(Path(source), "the study")}
+        if isinstance(preset := tree.get("preset"), str):
+            tree["preset"] = seen_from(Path(source).parent, preset)
     if "cluster" in tree:
         raise ConfigError(f"cluster = {shown(tree['cluster'])}: a study names no cluster any more: {INSTEAD}")
     return check_section(Study, tree)

@@ -251,9 +251,6 @@ class CircuitController(SegmentController):
             activation = np.minimum(np.maximum(activation, 0.0), 1.0)
         return activation if self.muscles_per_segment == 1 else activation.repeat(self.muscles_per_segment, axis=-1)
 
-    def _activity(self, neurons: list[int]) -> Array:
-        return np.clip(self.potential_mV[neurons] / self.circuit.range_mV, 0.0, 1.0)
-
     def _values(self) -> Values:
         arrays = self.stepper.arrays
         gate = np.full(len(arrays.neurons), np.nan)
@@ -263,7 +260,8 @@ class CircuitController(SegmentController):
         if "sensor_on" in self._now:
             values["sensor_on"] = self._now["sensor_on"].astype(np.float64)
         for signal, neurons in self.circuit.activities.items():
-            activity = self._activity([arrays.neurons.index(name) for name in neurons])
+            potential_mV = self.potential_mV[[arrays.neurons.index(name) for name in neurons]]
+            activity = np.clip(potential_mV / self.circuit.range_mV, 0.0, 1.0)
             values[signal] = activity if signal != "drive" else float(activity[0])
         return values
 

@@ -40,10 +40,7 @@ DEFINITIONS = {
     "time step": "largest difference between the run and one of finer physics steps",
     "elements": "largest difference between the run and one of more elements a side",
     "total": "root of the sum of the squares of those that are known",
-    "not converged": "the difference of time step or of elements exceeds half of the value",
 }
-NOT_CONVERGED = 0.5
-"""Numerical error, of the value, above which a quantity does not count as converged."""
 SHOWN = (
     "period_s",
     "elongation_mean_max_m",
@@ -100,29 +97,6 @@ class Quantity:
         return sqrt(sum(error**2 for error in known)) if known else None
 
     @property
-    def converged(self) -> bool | None:
-        """Whether neither numerical error exceeds half of the value; None as long as one of them is not known."""
-        if self._too_large:
-            return False
-        return None if None in (self.value, self.time_step, self.elements) else True
-
-    @property
-    def note(self) -> str:
-        """What is wrong with it, in words; empty where nothing is."""
-        if self.value is None:
-            return "not known from this run"
-        unknown = [kind for kind, error in self.errors.items() if error is None]
-        words = [f"not converged: {' and '.join(self._too_large)}"] if self._too_large else []
-        words += [f"without {' and '.join(unknown)}"] if unknown else []
-        return "; ".join(words)
-
-    @property
-    def _too_large(self) -> list[str]:
-        numerical = {"time step": self.time_step, "elements": self.elements}
-        limit = NOT_CONVERGED * abs(self.value or 0.0)
-        return [] if self.value is None else [kind for kind, error in numerical.items() if (error or 0.0) > limit]
-
-    @property
     def row(self) -> dict[str, Any]:
         """What the files of results say of it."""
         return {
@@ -133,8 +107,6 @@ class Quantity:
             "elements": self.elements,
             "total": self.total,
             "n_samples": self.n_samples,
-            "converged": self.converged,
-            "note": self.note,
         }
 
     def error_text(self, error: float | None) -> str:
@@ -304,7 +276,7 @@ def uncertainty_table(result: Uncertainty) -> Table:
     for quantity in result.quantities:
         if quantity.value is not None or quantity.n_samples:
             errors = map(quantity.error_text, quantity.errors.values())
-            table.add_row(quantity.label, "\n".join(filter(None, (str(quantity), quantity.note))), *errors)
+            table.add_row(quantity.label, str(quantity), *errors)
     return table
 
 

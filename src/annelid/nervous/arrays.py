@@ -8,10 +8,10 @@ rectified differences and the plain potentials of gap junctions, the constant 1 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import accumulate, pairwise, zip_longest
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,6 @@ from annelid.nervous import neurons as parts
 from annelid.nervous.neurons import Array
 from annelid.nervous.wiring import Wiring
 
-Key = TypeVar("Key", bound=tuple)
 # Fills the slots of channels that have fewer gates than others: never moves, and counts as 1.
 NO_GATE = parts.Gate(slope_per_mV=0.0, power=0.0)
 
@@ -79,7 +78,8 @@ def build_arrays(network: Wiring) -> NetworkArrays:
     synapses = [(pre, post, s) for pre, post, s in ends if isinstance(s, parts.Synapse)]
     rectified = [(pre, post, s) for pre, post, s in ends if isinstance(s, parts.GapJunction) and s.rectified]
     plain = [(pre, post, s) for pre, post, s in ends if isinstance(s, parts.GapJunction) and not s.rectified]
-    terminals = _numbered((pre, s.threshold_mV, s.saturation_mV) for pre, _, s in synapses)
+    distinct = sorted({(pre, s.threshold_mV, s.saturation_mV) for pre, _, s in synapses})
+    terminals = {terminal: place for place, terminal in enumerate(distinct)}
     channels = [(i, channel) for i, neuron in enumerate(neurons) for channel in neuron.channels]
     gates, n_slow = _slots([channel for _, channel in channels])
 
@@ -137,11 +137,6 @@ def build_arrays(network: Wiring) -> NetworkArrays:
         drive=drive,
         weights=_frozen(weights),
     )
-
-
-def _numbered(keys: Iterable[Key]) -> dict[Key, int]:
-    """The place of every distinct key in ascending order."""
-    return {key: place for place, key in enumerate(sorted(set(keys)))}
 
 
 def _slots(channels: Sequence[parts.Channel]) -> tuple[tuple[tuple[parts.Gate, ...], ...], int]:

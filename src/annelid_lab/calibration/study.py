@@ -147,10 +147,6 @@ class IdentifyStudy(Section):
         chosen = {name: known[name].model_dump(exclude_none=True) for name in names}
         return check_section(IdentifyStudy, {**self.model_dump(exclude_none=True), "parameters": chosen})
 
-    def with_changes(self, changes: Mapping[str, Any]) -> IdentifyStudy:
-        """Returns the study with further changes of its worm, by dotted path."""
-        return self.model_copy(update={"set": {**self.set, **changes}})
-
     def source(self, folder: Path) -> str:
         """Returns the preset that the study starts from, or the path of the file in the study's folder."""
         if self.preset in preset_names():

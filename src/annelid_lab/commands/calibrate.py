@@ -75,7 +75,8 @@ def calibrate_command(
         typer.echo(ROBOT.read_text(encoding="utf-8"), nl=False)
         return
     source = ROBOT if study is None else study
-    loaded = load_identify_study(source).with_changes(overrides_of(assignments))
+    loaded = load_identify_study(source)
+    loaded = loaded.model_copy(update={"set": {**loaded.set, **overrides_of(assignments)}})
     loaded = loaded.only(free) if free else loaded
     with kept_runs(output, jobs=jobs, scheduler=scheduler, quiet=quiet) as store:
         refuse_existing(output / REPORT, force)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 import time
 from collections import deque
 from collections.abc import Callable
@@ -9,22 +10,18 @@ from collections.abc import Callable
 import numpy as np
 
 from annelid_lab.loop.links import MOST_READ
-from annelid_lab.loop.servos import BROADCAST, WATCHDOG_UNIT_S, Instruction, PacketDecoder, Register, Wiring, packet
+from annelid_lab.loop.servos import WATCHDOG_UNIT_S, Instruction, PacketDecoder, Register, Wiring, packet
 
-_SIZES = {
-    Register.TORQUE: 1,
-    Register.WATCHDOG: 1,
-    Register.GOAL: 4,
-    Register.POSITION: 4,
-    Register.POTENTIOMETER: 2,
-}
-_DATA_RANGE_ERROR, _ACCESS_ERROR = 0x04, 0x07
+REACH_M = 0.06
+"""Lengthening of a segment that is contracted fully."""
+LATENCY_S = 0.001
+"""Time from a packet to its answer."""
 
 
 class PseudoRobot:
     """Servos 1 .. n, which follow their goals with a lag, and the potentiometers of the segments that they contract.
 
-    A contracted segment is longer by ``reach_m``. A potentiometer reads whole counts of 12 bits with normal noise. It
+    A contracted segment is longer by `REACH_M`. A potentiometer reads whole counts of 12 bits with normal noise. It
     is a `Link`: what the loop sends reaches the servos at once, and what they answer comes after a latency.
 
     Attributes:
@@ -39,11 +36,8 @@ class PseudoRobot:
         n_segments: int,
         n_muscles: int,
         *,
-        reach_m: float = 0.06,
         lag_s: float = 0.15,
         noise_m: float = 0.0005,
-        latency_s: float = 0.001,
-        seed: int = 0,
         wiring: Wiring | None = None,
         clock: Callable[[], float] = time.perf_counter,
         sleep: Callable[[float], None] = time.sleep,
@@ -53,25 +47,21 @@ class PseudoRobot:
         Args:
             n_segments: Segments.
             n_muscles: Servos, one or two per segment.
-            reach_m: Lengthening of a segment that is contracted fully, m.
             lag_s: Time constant of a servo with its segment, s.
             noise_m: Standard deviation of a potentiometer's noise, m.
-            latency_s: Time from a packet to its answer, s.
-            seed: Of the noise.
             wiring: Positions and counts.
             clock: Time that never goes back, s.
             sleep: Waits so many seconds.
         """
         self.wiring = wiring or Wiring()
-        self._n_segments, self._n = n_segments, n_muscles
-        self._reach_m, self._lag_s, self._noise_m, self._latency_s = reach_m, lag_s, noise_m, latency_s
-        self._rng = np.random.default_rng(seed)
+        self._n_segments, self._servos = n_segments, range(1, n_muscles + 1)
+        self._lag_s, self._noise_m, self._rng = lag_s, noise_m, np.random.default_rng(0)
         self._decoder = PacketDecoder()
         self._clock, self._sleep = clock, sleep
         self._now_s = self._last_packet_s = clock()
         self._answers: deque[tuple[float, bytes]] = deque(maxlen=1024)
         self.position = np.full(n_muscles, float(self.wiring.relaxed))
-        self._table = {register: np.zeros(n_muscles, dtype=np.int64) for register in _SIZES}
+        self._table = {register: np.zeros(n_muscles, dtype=np.int64) for register in Register}
         self._table[Register.GOAL][:] = self.wiring.relaxed
         self._watchdog_ended = np.zeros(n_muscles, dtype=bool)
 
@@ -83,10 +73,9 @@ class PseudoRobot:
     def send(self, data: bytes) -> None:
         """Takes bytes from the bus, as `Link.send`."""
         self._move()
-        for servo, instruction, parameters in self._decoder.feed(data):
-            if instruction != Instruction.STATUS:
-                self._last_packet_s = self._now_s
-                self._execute(servo, instruction, parameters)
+        for _, instruction, parameters in self._decoder.feed(data):
+            self._last_packet_s = self._now_s
+            self._execute(instruction, parameters)
 
     def receive(self, timeout_s: float) -> bytes:
         """Returns what the servos have answered by now, as `Link.receive`."""
@@ -117,56 +106,31 @@ class PseudoRobot:
         share = -np.expm1(-time_s / self._lag_s)
         self.position += np.where(moves, share * (self._table[Register.GOAL] - self.position), 0.0)
 
-    def _execute(self, servo: int, instruction: int, parameters: bytes) -> None:
-        mine = range(1, self._n + 1)
-        head, rest = parameters[:4], parameters[4:]
-        address, size = int.from_bytes(head[:2], "little"), int.from_bytes(head[2:], "little")
-        match instruction:
-            case Instruction.PING:
-                for each in mine if servo == BROADCAST else {servo} & set(mine):
-                    self._answer(each, 0, b"\x60\x04\x2d")
-            case Instruction.READ if servo in mine and len(parameters) == 4:
-                self._read(servo, address, size)
-            case Instruction.SYNC_READ if servo == BROADCAST:
-                for each in rest:
-                    if each in mine:
-                        self._read(each, address, size)
-            case Instruction.WRITE if servo in mine and len(parameters) > 2:
-                self._answer(servo, self._write(servo, address, parameters[2:]), b"")
-            case Instruction.SYNC_WRITE if servo == BROADCAST and size > 0:
-                for start in range(0, len(rest) - size, size + 1):
-                    if rest[start] in mine:
-                        self._write(rest[start], address, rest[start + 1 : start + 1 + size])
-
-    def _read(self, servo: int, address: int, size: int) -> None:
-        if _SIZES.get(address) != size:  # type: ignore[call-overload]
-            self._answer(servo, _ACCESS_ERROR, b"")
+    def _execute(self, instruction: int, parameters: bytes) -> None:
+        """Reads or writes one register of several servos, which is all that the loop asks for."""
+        address, size = struct.unpack_from("<HH", parameters)
+        register, rest = Register(address), parameters[4:]
+        if instruction == Instruction.SYNC_READ:
+            for servo in filter(self._servos.__contains__, rest):
+                value = int(self._table[register][servo - 1])
+                if register == Register.POTENTIOMETER:
+                    value = self._counts((servo - 1) // (len(self._servos) // self._n_segments))
+                status = packet(servo, Instruction.STATUS, b"\0" + value.to_bytes(size, "little"))
+                self._answers.append((self._now_s + LATENCY_S, status))
             return
-        register = Register(address)
-        value = int(self._table[register][servo - 1])
-        if register == Register.POSITION:
-            value = round(self.position[servo - 1])
-        elif register == Register.POTENTIOMETER:
-            of_segment = self.contraction.reshape(self._n_segments, -1).mean(axis=1)
-            segment = (servo - 1) // (self._n // self._n_segments)
-            length_m = self._reach_m * of_segment[segment] + self._rng.normal(0.0, self._noise_m)
-            value = min(max(round(self.wiring.rest_counts + length_m / self.wiring.m_per_count), 0), 4095)
-        self._answer(servo, 0, value.to_bytes(size, "little"))
+        for start in range(0, len(rest), size + 1):
+            if rest[start] in self._servos:
+                self._write(rest[start] - 1, register, int.from_bytes(rest[start + 1 : start + 1 + size], "little"))
 
-    def _write(self, servo: int, address: int, data: bytes) -> int:
-        """Writes a register; returns the number of the error."""
-        if _SIZES.get(address) != len(data) or address >= Register.POSITION:  # type: ignore[call-overload]
-            return _ACCESS_ERROR
-        value = int.from_bytes(data, "little")
-        if value > (4095 if address == Register.GOAL else 127):
-            return _DATA_RANGE_ERROR
-        if address == Register.WATCHDOG and value == 0:
-            self._watchdog_ended[servo - 1] = False
-        elif address == Register.GOAL and self._watchdog_ended[servo - 1]:
-            return _DATA_RANGE_ERROR
-        self._table[Register(address)][servo - 1] = value
-        return 0
+    def _counts(self, segment: int) -> int:
+        """Reads the potentiometer of a segment."""
+        of_segment = self.contraction.reshape(self._n_segments, -1).mean(axis=1)
+        length_m = REACH_M * of_segment[segment] + self._rng.normal(0.0, self._noise_m)
+        return min(max(round(self.wiring.rest_counts + length_m / self.wiring.m_per_count), 0), 4095)
 
-    def _answer(self, servo: int, error: int, data: bytes) -> None:
-        status = packet(servo, Instruction.STATUS, bytes([error]) + data)
-        self._answers.append((self._now_s + self._latency_s, status))
+    def _write(self, place: int, register: Register, value: int) -> None:
+        if register == Register.WATCHDOG and value == 0:
+            self._watchdog_ended[place] = False
+        elif register == Register.GOAL and self._watchdog_ended[place]:
+            return
+        self._table[register][place] = value

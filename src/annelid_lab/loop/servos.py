@@ -32,9 +32,6 @@ WATCHDOG_UNIT_S = 0.02
 class Instruction(IntEnum):
     """What a packet asks for, or that it is an answer."""
 
-    PING = 0x01
-    READ = 0x02
-    WRITE = 0x03
     STATUS = 0x55
     SYNC_READ = 0x82
     SYNC_WRITE = 0x83
@@ -46,7 +43,6 @@ class Register(IntEnum):
     TORQUE = 64
     WATCHDOG = 98
     GOAL = 116
-    POSITION = 132
     POTENTIOMETER = 152
 
 

@@ -52,7 +52,7 @@ class MjcfBody(BodyKind):
     suffix: ClassVar[str] = ".xml"
     kind: Literal["mjcf"] = "mjcf"
     xml: Annotated[str, AfterValidator(validator(ROBOT))] = Field(
-        default=EXAMPLE, description="the robot and its ground as MJCF, at most 1 MB; annelid run robot.xml reads one"
+        default=EXAMPLE, description="the robot and its ground as MJCF, at most 4 MB; annelid run robot.xml reads one"
     )
     actuators: Annotated[tuple[Pattern, ...], Field(min_length=1, max_length=2)] = Field(
         default=("ring_{segment}",),

@@ -14,12 +14,13 @@ import numpy as np
 
 from annelid.errors import ConfigError, listed, shortened, shown
 from annelid.protocols import Array
+from annelid.textfiles import tag_of
 
 PLUGIN = "mujoco.elasticity.cable"
 MOST_VERTICES = 180
 """Of one cable, whose bodies lie within one another."""
 TAKEN = {
-    "composite": frozenset(["type", "prefix", "initial", "vertex", "offset"]),
+    "composite": frozenset(["type", "prefix", "initial", "vertex", "offset", "curve", "count", "size"]),
     "joint": frozenset(["kind", "armature", "damping", "frictionloss"]),
     "plugin": frozenset(["plugin"]),
 }
@@ -45,45 +46,40 @@ def write_out(root: ET.Element) -> None:
 
 
 def _row(cable: ET.Element) -> ET.Element:
-    prefix, initial = cable.get("prefix", ""), cable.get("initial", "none")
-    if cable.get("type") != "cable" or not cable.get("vertex") or initial not in ("none", "free"):
+    prefix, initial, about = cable.get("prefix", ""), cable.get("initial", "none"), f"{tag_of(cable)}>"
+    if cable.get("type") != "cable" or initial not in ("none", "ball", "free"):
         raise ConfigError(
-            f"<composite prefix={shown(prefix)}>: only a cable can be read, type='cable' with vertex=.. and "
-            "initial='none' or 'free'"
+            f"{about}: only a cable can be read, type='cable' with initial='none', 'ball' or 'free'; write other "
+            "composites out as bodies"
         )
     for element in cable.iter():
         if unknown := element.attrib.keys() - TAKEN.get(element.tag, element.attrib.keys()):
             name, valid = sorted(unknown)[0], listed(sorted(TAKEN[element.tag]))
             raise ConfigError(
-                f"<{element.tag} {shortened(name)}=..>: a cable cannot have this attribute; valid: {valid}"
+                f"{tag_of(element)} {shortened(name)}=..>: a cable cannot have this attribute; valid: {valid}"
             )
     if any(plugin.get("plugin") != PLUGIN for plugin in cable.iterfind("plugin")):
-        raise ConfigError(
-            f"<composite prefix={shown(prefix)}>: the one plug-in of a cable is {PLUGIN}; others are code"
-        )
-    given = _numbers(cable, "vertex", "")
-    if len(given) % 3 or not 9 <= len(given) <= 3 * MOST_VERTICES:
-        raise ConfigError(
-            f"<composite prefix={shown(prefix)}>: vertex must have three numbers of each of 3 to {MOST_VERTICES:,} "
-            "places"
-        )
+        raise ConfigError(f"{about}: the one plug-in of a cable is {PLUGIN}; others are code")
+    vertices = _vertices(cable)
     joint, geom = (_only(cable, tag) for tag in ("joint", "geom"))
     config = {one.get("key", ""): one for one in cable.iterfind("plugin/config")}
     if other := {key for key, one in config.items() if one.get("value") != "false"} - MATERIAL:
         raise ConfigError(
-            f"<config key={shown(min(other))}>: a cable cannot have it; valid: {listed(sorted(MATERIAL))}. A reference "
-            "posture that is not the file's is not read"
+            f"{tag_of(config[min(other)])} key={shown(min(other))}>: a cable cannot have it; valid: "
+            f"{listed(sorted(MATERIAL))}. A cable is at rest as the file shows it: write a flat one's places straight"
         )
     bend_Pa, twist_Pa = (_numbers(config[key], "value", "0")[0] if key in config else 0.0 for key in ("bend", "twist"))
+    if (section := geom.get("type", "capsule")) not in ("capsule", "cylinder"):
+        raise ConfigError(
+            f"{tag_of(geom)} type={shown(section)}>: a cable has capsules or cylinders, for their stiffness"
+        )
     radius_m = _numbers(geom, "size", "0.005")[0]
     look = {name: value for name, value in geom.attrib.items() if name not in ("type", "size")}
     friction = {name: value for name, value in joint.attrib.items() if name != "kind"}
-    vertices, offset = np.array(given).reshape(-1, 3), np.array(_numbers(cable, "offset", "0 0 0"))
+    offset = np.array(_numbers(cable, "offset", "0 0 0"))
     edges = np.diff(vertices, axis=0)
     if offset.shape != (3,) or not np.linalg.norm(edges, axis=1).all():
-        raise ConfigError(
-            f"<composite prefix={shown(prefix)}>: offset must be three numbers, and no two vertices alike"
-        )
+        raise ConfigError(f"{about}: offset must be three numbers, and no two vertices alike")
     places = [vertices[0] + offset, *edges[:-1]]
     first = element = None
     for number, (place, edge) in enumerate(zip(places, edges, strict=True)):
@@ -93,6 +89,9 @@ def _row(cable: ET.Element) -> ET.Element:
             first = body
             if initial == "free":
                 ET.SubElement(body, "freejoint")
+            elif initial == "ball":
+                ET.SubElement(body, "joint", {"type": "ball", **friction})
+            ET.SubElement(body, "site", {"name": f"{prefix}S_first"})
         else:
             element.append(body)
             length_m = float(np.linalg.norm(edge))
@@ -100,12 +99,42 @@ def _row(cable: ET.Element) -> ET.Element:
             for axis, spring in zip(_axes(edge / length_m), (twist, bend, bend), strict=True):
                 hinge = {"type": "hinge", "axis": _text(axis), "stiffness": f"{spring:.9g}"}
                 ET.SubElement(body, "joint", {**hinge, **friction})
-        ET.SubElement(
-            body, "geom", {**look, "type": "capsule", "fromto": f"0 0 0 {_text(edge)}", "size": f"{radius_m:g}"}
-        )
+        shape = {"type": section, "fromto": f"0 0 0 {_text(edge)}", "size": f"{radius_m:g}"}
+        ET.SubElement(body, "geom", {**look, **shape, "name": f"{prefix}G{number}"})
         element = body
     assert first is not None
+    assert element is not None
+    ET.SubElement(element, "site", {"name": f"{prefix}S_last", "pos": _text(edges[-1])})
     return first
+
+
+def _vertices(cable: ET.Element) -> Array:
+    """The places of a cable's vertices, as written or on a curve, ``(n, 3)``.
+
+    Along a curve, s goes to the first size. ``cos(s)`` and ``sin(s)`` have the second as amplitude, and go through the
+    third half turns.
+    """
+    about = f"{tag_of(cable)}>"
+    if cable.get("vertex"):
+        given = np.array(_numbers(cable, "vertex", ""))
+        if len(given) % 3 or not 9 <= len(given) <= 3 * MOST_VERTICES:
+            raise ConfigError(f"{about}: vertex must have three numbers of each of 3 to {MOST_VERTICES:,} places")
+        return given.reshape(-1, 3)
+    count, *across = _numbers(cable, "count", "0")
+    words = cable.get("curve", "").split()
+    if not (count.is_integer() and 3 <= count <= MOST_VERTICES) or any(one != 1 for one in across):
+        raise ConfigError(f"{about}: needs vertex=.., or curve=.. and count='N 1 1' with 3 to {MOST_VERTICES:,} places")
+    share, size = np.linspace(0.0, 1.0, int(count)), [*_numbers(cable, "size", "1"), 0.0, 0.0]
+    turn = pi * size[2] * share
+    curves = {
+        "s": size[0] * share,
+        "cos(s)": size[1] * np.cos(turn),
+        "sin(s)": size[1] * np.sin(turn),
+        "0": 0.0 * share,
+    }
+    if not 1 <= len(words) <= 3 or not curves.keys() >= set(words):
+        raise ConfigError(f"{about}: curve={shown(cable.get('curve'))}: must be up to three of {listed(list(curves))}")
+    return np.stack([curves[word] for word in [*words, "0", "0"][:3]], axis=1)
 
 
 def _numbers(element: ET.Element, name: str, default: str) -> list[float]:
@@ -114,7 +143,7 @@ def _numbers(element: ET.Element, name: str, default: str) -> list[float]:
     except ValueError:
         numbers = []
     if not numbers or not np.isfinite(numbers).all():
-        raise ConfigError(f"<{element.tag} {name}={shown(element.get(name))}>: must be numbers")
+        raise ConfigError(f"{tag_of(element)} {name}={shown(element.get(name))}>: must be numbers")
     return numbers
 
 

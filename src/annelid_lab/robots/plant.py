@@ -16,6 +16,7 @@ from annelid.simulation import ENGINE_WARNINGS, STATE_PARTS
 from annelid_lab.robots.body import MjcfBody
 
 _AFFINE, _MUSCLE = int(mujoco.mjtBias.mjBIAS_AFFINE), int(mujoco.mjtGain.mjGAIN_MUSCLE)
+_INTEGRATOR = int(mujoco.mjtDyn.mjDYN_INTEGRATOR)
 _TENDON, _SITE = int(mujoco.mjtTrn.mjTRN_TENDON), int(mujoco.mjtTrn.mjTRN_SITE)
 _JOINTS = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
 _WRAPPED = (("xanchor", int(mujoco.mjtWrap.mjWRAP_JOINT)), ("site_xpos", int(mujoco.mjtWrap.mjWRAP_SITE)))
@@ -88,8 +89,8 @@ class MjcfPlant(SavedAndRecorded):
         mujoco.mj_resetData(self.model, self.data)
         self.data.ctrl[self._actuators] = self._rest
         for actuator, rest in zip(self._actuators.tolist(), self._rest.tolist(), strict=True):
-            # A filter begins where its command is, a muscle relaxed.
-            if self.model.actuator_actnum[actuator] == 1:
+            # A filter begins where its command is, a muscle relaxed, what integrates a speed at the file's posture.
+            if self.model.actuator_actnum[actuator] == 1 and self.model.actuator_dyntype[actuator] != _INTEGRATOR:
                 self.data.act[self.model.actuator_actadr[actuator]] = rest
         self._now: dict[str, Any] = {
             "engine": np.zeros(mujoco.mj_stateSize(self.model, STATE_PARTS)),

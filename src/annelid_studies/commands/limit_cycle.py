@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from annelid.cli import (
     Assignments,
-    Force,
     Preset,
     Segments,
     config_of,
     give,
     overrides_of,
-    print_paths,
-    refuse_existing,
     study,
 )
 
@@ -32,10 +28,6 @@ def limit_cycle_command(
     threshold: Annotated[
         float | None, typer.Option(help="Threshold, mV above rest.  [default: half the operating range]")
     ] = None,
-    output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="Picture to write: .png, .pdf, .svg  [default: none]")
-    ] = None,
-    force: Force = False,
 ) -> None:
     """Find a planar worm's limit cycle, and how stable it is.
 
@@ -44,28 +36,20 @@ def limit_cycle_command(
     below 1 in magnitude: the rhythm comes back by itself; the one at 1 is a shift in time, which stays.
 
     Time is continuous: the worm's equations are integrated between the switches of its sensors and synapses.
-    The picture shows the phase response too: by how much a kick of a neuron, at each phase, advances the rhythm.
+    With --json also the phase response: by how much a kick of a neuron, at each phase, advances the rhythm.
     It takes about ten seconds for 3 segments, twenty for 6. The body is riddle2022 and the controller sns;
     default preset: riddle2022-planar.
 
     \b
     annelid study limit-cycle riddle2022-planar --segments 6
-    annelid study limit-cycle riddle2022-planar -o cycle.png
     annelid study limit-cycle --set controller.gate_time_constant_ms=200 --set body.gain=1.9
     annelid study limit-cycle --json | jq .multipliers[0]
     """
-    from annelid.draw import plot_path
     from annelid.terminal import Console
     from annelid_studies.limit_cycle.cycle import limit_cycle
-    from annelid_studies.limit_cycle.figure import limit_cycle_figure
     from annelid_studies.limit_cycle.report import cycle_numbers, cycle_table
 
-    if output is not None:
-        output = plot_path(output)
-        refuse_existing(output, force)
     config = config_of("riddle2022-planar" if preset is None else preset, overrides_of(assignments), segments)
     cycle = limit_cycle(config, neuron=neuron, threshold_mV=threshold)
     if not give({"name": config.name, "n_segments": config.body.n_segments} | cycle_numbers(cycle)):
         Console().print(cycle_table(f"{config.name}, {config.body.n_segments} segments", cycle))
-    if output is not None:
-        print_paths([limit_cycle_figure(cycle, output)])

@@ -9,47 +9,34 @@ point to this combination of sensors; how they are combined is our own.
 
 from __future__ import annotations
 
-from dataclasses import KW_ONLY, dataclass, field
-
 import numpy as np
 from numpy.typing import NDArray
 
 from annelid.control import lengthening_m
-from annelid.errors import require_at_least, require_positive
 from annelid.protocols import Array, Sensation
 
+TIME_CONSTANT_S = 0.03
+"""Of the first-order filter on lengths and loads."""
+LEAST_LOAD_N = 1.0
+"""A segment that bears less does not slip."""
+LIMIT_M_PER_S = 0.1
+"""Estimated speed over the ground above which a segment is said to slip."""
+SPRINGS_PER_SEGMENT = 1.5
+"""By how many times a segment lengthens more than its stretch sensor."""
 
-@dataclass
+
 class SlipDetector:
     """Estimates every segment's speed over the ground, and which ones slip.
 
     Attributes:
         n_segments: Number of segments.
-        time_constant_s: Of the first-order filter on lengths and loads, s.
-        least_load_N: A segment that bears less does not slip, N.
-        limit_m_per_s: Estimated speed over the ground above which a segment is said to slip, m/s.
-        springs_per_segment: Length of a segment over that of its stretch sensor: by how many times the segment
-            lengthens more than the sensor.
         speed_m_per_s: Estimated speed of each segment over the ground, positive towards the front, ``(n_segments,)``.
         bears: Which segments bear enough load to slip, ``(n_segments,)``.
-
-    Raises:
-        ConfigError: Fewer than 2 segments, a time constant or a limit that is not positive, or a share below 0.
     """
 
-    n_segments: int
-    _: KW_ONLY
-    time_constant_s: float = 0.03
-    least_load_N: float = 1.0
-    limit_m_per_s: float = 0.1
-    springs_per_segment: float = 1.5
-    speed_m_per_s: Array = field(init=False)
-    bears: NDArray[np.bool_] = field(init=False)
-
-    def __post_init__(self) -> None:
-        require_at_least(2, n_segments=self.n_segments)
-        require_positive(time_constant_s=self.time_constant_s, limit_m_per_s=self.limit_m_per_s)
-        require_at_least(0, least_load_N=self.least_load_N, springs_per_segment=self.springs_per_segment)
+    def __init__(self, n_segments: int) -> None:
+        """Takes the number of segments."""
+        self.n_segments = n_segments
         self.reset()
 
     def reset(self) -> None:
@@ -67,20 +54,20 @@ class SlipDetector:
         Returns:
             Which segments slip, ``(n_segments,)``; none at the first reading, or if no time has passed.
         """
-        longer_m = self.springs_per_segment * lengthening_m(sensation.stretch_m, sensation.rest_stretch_m)
+        longer_m = SPRINGS_PER_SEGMENT * lengthening_m(sensation.stretch_m, sensation.rest_stretch_m)
         load_N = sensation.touch_N.sum(axis=1)
         passed_s = sensation.time_s - self._time_s
         self._time_s = sensation.time_s
         if not passed_s > 0.0:
             self._longer_m, self._load_N = longer_m, load_N
             return np.zeros(self.n_segments, dtype=bool)
-        share = passed_s / (self.time_constant_s + passed_s)
+        share = passed_s / (TIME_CONSTANT_S + passed_s)
         before = self._longer_m
         self._longer_m = before + share * (longer_m - before)
         self._load_N = self._load_N + share * (load_N - self._load_N)
         self.speed_m_per_s = ground_speed((self._longer_m - before) / passed_s, self._load_N)
-        self.bears = self._load_N >= self.least_load_N
-        return (np.abs(self.speed_m_per_s) > self.limit_m_per_s) & self.bears
+        self.bears = self._load_N >= LEAST_LOAD_N
+        return (np.abs(self.speed_m_per_s) > LIMIT_M_PER_S) & self.bears
 
 
 def ground_speed(lengthening_m_per_s: Array, load_N: Array) -> Array:

@@ -50,12 +50,8 @@ class DetectionScore:
     correlation: float  # of true and estimated speed where the segment bears load, truly or by the detector
 
 
-def detect_slip(run: Run, detector: SlipDetector | None = None) -> Detection:
-    """Has a detector read a run sample by sample, with the true slip beside it.
-
-    Args:
-        run: The run of a 3D worm.
-        detector: The detector; default: `annelid_studies.slip_detector.detector.SlipDetector` as it is.
+def detect_slip(run: Run) -> Detection:
+    """Has the detector read a run of a 3D worm sample by sample, with the true slip beside it.
 
     Raises:
         RunFileError: The run has no touch.
@@ -65,8 +61,7 @@ def detect_slip(run: Run, detector: SlipDetector | None = None) -> Detection:
         raise RunFileError(f"{run.path} holds no touch of a skin: only runs of the 3D worm do")
     time, stretch, touch = (data[name].values for name in ("time", "stretch_length", "touch"))
     rest = np.broadcast_to(data["stretch_rest_length"].values, stretch.shape)
-    reader = SlipDetector(touch.shape[1]) if detector is None else detector
-    reader.reset()
+    reader = SlipDetector(touch.shape[1])
     nothing = np.zeros(0)
     estimated, bears = np.zeros(touch.shape[:2]), np.zeros(touch.shape[:2], dtype=bool)
     for i in range(len(time)):

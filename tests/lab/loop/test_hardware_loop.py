@@ -27,7 +27,7 @@ from annelid_lab.firmware import controller_firmware
 from annelid_lab.loop import Interface, Limits, Peer, PseudoRobot, Role, UdpLink, Wiring, drive, open_link
 from annelid_lab.loop.links import Link
 from annelid_lab.loop.peer import serve
-from annelid_lab.loop.servos import ServoPlant
+from annelid_lab.loop.servos import Instruction, ServoPlant, packet
 from annelid_lab.loop.session import Pace
 
 COMPILER = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler called cc")
@@ -158,8 +158,7 @@ def test_a_servo_that_is_unplugged_or_missing_or_overheated_is_said() -> None:
     bus = Bus()
     plant = servo_plant(bus)
     plant.reset(0)
-    answer = bus._answer
-    bus._answer = lambda servo, error, data: answer(servo, 0x80 if servo == 2 else error, data)  # type: ignore[method-assign]
+    bus.fault = lambda data: packet(2, Instruction.STATUS, b"\x80\0\0") if data else b""
     with pytest.raises(SimulationStopped, match="servo 2 at bus reports error 0x80"):
         plant.stride(np.ones((10, 3)))
 

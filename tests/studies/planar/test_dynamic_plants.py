@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from annelid.config import Clock, load_config
-from annelid.protocols import Plant, Records, Sensation, Stateful, Watched
-from annelid.simulation.stepping import build_plant
+from annelid.config import Clock
+from annelid.protocols import Sensation
 from annelid_studies.planar import Boxerbaum2012Plant, Daltorio2013Plant
 from annelid_studies.planar.boxerbaum2012 import Boxerbaum2012Body
 from annelid_studies.planar.daltorio2013 import Daltorio2013Body
@@ -91,13 +90,6 @@ def test_the_books_close(build) -> None:
     assert errors[1] < 0.5 * errors[0]
 
 
-def test_without_ground_the_centre_of_mass_stays() -> None:
-    felt = waves(boxerbaum(), 0.3, 3)
-    x = np.array([f.center_of_mass_m[0] for f in felt])
-    assert np.ptp(x) < 1e-6
-    assert not any(f.contact_force_N.any() for f in felt)
-
-
 @pytest.mark.parametrize("friction", [0.2, 1.0])
 def test_a_gliding_worm_is_stopped_by_friction_as_a_block_is(friction: float) -> None:
     plant = daltorio(Clock(control_timestep_s=0.001, physics_timestep_s=0.001), wall_friction=friction)
@@ -158,19 +150,6 @@ def test_contraction_spreads_to_the_neighbours_of_bending_sides_over_a_range() -
     assert np.all(np.diff(shares) > 0.0)
 
 
-@pytest.mark.parametrize(
-    "changed",
-    [
-        {},
-        {"wall_friction": 0.2},
-    ],
-    ids=str,
-)
-def test_in_the_pipe_it_crawls_against_the_wave(changed: dict[str, Any]) -> None:
-    felt = waves(daltorio(**changed), 0.4, 4)
-    assert felt[-1].center_of_mass_m[0] < felt[0].center_of_mass_m[0] - 0.003
-
-
 @BOTH
 def test_restored_worm_continues_bit_for_bit(build) -> None:
     drive = np.random.default_rng(0).random((60, 3))
@@ -184,23 +163,6 @@ def test_restored_worm_continues_bit_for_bit(build) -> None:
     for name, value in one.read(frame=False).items():
         assert np.array_equal(np.asarray(value), np.asarray(other.read(frame=False)[name])), name
     assert {k: v.shape for k, v in one.get_state().items()} == {k: v.shape for k, v in build().get_state().items()}
-
-
-@pytest.mark.parametrize(
-    ("preset", "kind"), [("daltorio2013", Daltorio2013Plant), ("boxerbaum2012", Boxerbaum2012Plant)]
-)
-def test_presets_build_plants_that_record_restore_and_watch(preset: str, kind: type) -> None:
-    plant: Plant = build_plant(load_config(preset))
-    assert isinstance(plant, kind)
-    assert isinstance(plant, Records)
-    assert isinstance(plant, Stateful)
-    assert isinstance(plant, Watched)
-    assert plant.n_segments == plant.n_muscles == 6
-    felt = plant.step(np.linspace(0, 1, 6))
-    values = plant.read(frame=False)
-    assert {s.name: s.shape for s in plant.recordable().signals} == {k: np.shape(v) for k, v in values.items()}
-    assert np.array_equal(np.asarray(values["stretch_length"]), felt.stretch_m)
-    assert plant.read(frame=True) == {}
 
 
 def test_a_worm_whose_muscles_overpower_it_raises_the_alarm() -> None:

@@ -91,16 +91,6 @@ def test_restored_plant_continues_bit_for_bit():
         assert again.time_s == felt.time_s
 
 
-def test_recordable_names_what_read_returns():
-    one = plant(n_segments=4)
-    felt = one.step(np.array([0.2, 0.9, 0.0, 0.5]))
-    values = one.read(frame=False)
-    assert {s.name: s.shape for s in one.recordable().signals} == {k: np.shape(v) for k, v in values.items()}
-    assert np.array_equal(np.asarray(values["ring_length"]), felt.ring_length_m)
-    assert np.array_equal(np.asarray(values["stretch_length"]), felt.stretch_m)
-    assert one.read(frame=True) == {}
-
-
 def test_a_step_that_would_overshoot_is_refused():
     with pytest.raises(ConfigError, match=r"physics_timestep_s = 0\.2 .* at most 0\.110"):
         plant(Clock(control_timestep_s=0.1, physics_timestep_s=0.2))

@@ -31,7 +31,7 @@ class Scene(ArenaKind):
     suffix: ClassVar[str] = ".xml"
     is_scene: ClassVar[bool] = True
     xml: Annotated[str, AfterValidator(validator(SCENE))] = Field(
-        default=FLOOR, description="the scene as MJCF without files, at most 1 MB; --arena scene.xml reads one"
+        default=FLOOR, description="the scene as MJCF without files, at most 4 MB; --arena scene.xml reads one"
     )
     floor_gap_m: NonNegative = Field(
         default=0.009, description="distance of the scene's z = 0 below the mesh's lowest line"

@@ -1,9 +1,9 @@
-"""Elements per rhombus side: what is converged in a held contraction and in the walk."""
+"""Elements per rhombus side: what is converged in a held contraction."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,18 +24,14 @@ HELD: Mapping[Effort, Mapping[Worm, Sequence[int]]] = {
     "full": {RIGID: (1, 2, 3, 4, 6), PAPERS: (1, 2, 3, 4)},
 }
 """Elements a side with which each worm is held contracted, the finest last."""
-WALKED: Mapping[Effort, Sequence[int]] = {"quick": (1, 2, 3), "full": (1, 2, 3, 4, 6)}
-"""Elements a side with which rods with rigid crossings walk."""
 
 
 def _points(effort: Effort) -> list[Point]:
-    points = []
-    for worm, elements in HELD[effort].items():
-        for n in elements:
-            mesh = {"body.mesh.elements_per_side": n}
-            walk = worm.case(mesh) if worm is RIGID and n in WALKED[effort] else None
-            points.append(Point(worm, n, walk, worm.case({**mesh, **one_after_the_other()})))
-    return points
+    return [
+        Point(worm, n, None, worm.case({"body.mesh.elements_per_side": n, **one_after_the_other()}))
+        for worm, elements in HELD[effort].items()
+        for n in elements
+    ]
 
 
 def convergence_order(elements: ArrayLike, difference: ArrayLike, finest: float) -> float | None:
@@ -67,10 +63,7 @@ class Convergence(NamedTuple):
 
     worm: Worm
     elements: Sequence[int]  # Numbers of elements, the finest mesh last
-    # For each quantity its relative difference from the finest, root mean square over the segments, shape ``(n_meshes -
-    # 1,)``
-    difference: Mapping[str, Array]
-    of_presets: Mapping[str, float]  # For each quantity that with the presets' mesh
+    of_presets: Mapping[str, float]  # For each quantity the difference of the presets' mesh from the finest, relative
     order: Mapping[str, float | None]  # For each quantity the fitted order of convergence
 
 
@@ -81,7 +74,7 @@ def measure_convergence(readings: Sequence[Reading]) -> Convergence:
     difference = {name: np.array([_apart(name, one, finest) for one in coarser]) for name in QUANTITIES}
     of_presets = {name: float(apart[n.index(PRESETS_ELEMENTS)]) for name, apart in difference.items()}
     order = {name: convergence_order(n, apart, most) for name, apart in difference.items()}
-    return Convergence(finest.worm, elements, difference, of_presets, order)
+    return Convergence(finest.worm, elements, of_presets, order)
 
 
 def _apart(quantity: str, one: Reading, other: Reading) -> float:
@@ -92,10 +85,7 @@ def _apart(quantity: str, one: Reading, other: Reading) -> float:
 
 def _examine(store: Store, effort: Effort) -> Findings:
     readings = design.read(_points(effort), store)
-    by_worm = design.by_worm(readings)
-    held = [measure_convergence(own) for own in by_worm.values()]
-    walks = [one for one in readings if one.walk]
-    first = held[0]
+    held = [measure_convergence(own) for own in design.by_worm(readings).values()]
     numbers: dict[str, Number] = {}
     for found in held:
         for name, apart in found.of_presets.items():
@@ -107,18 +97,8 @@ def _examine(store: Store, effort: Effort) -> Findings:
         "ring held (m)": lambda one: words.each_in_unit(one.at_holds("ring_length_m"), digits=3),
         "elongation held (cm)": lambda one: words.all_in_cm(one.held_m),
         "force held (N)": lambda one: words.each_in_unit(one.at_holds("force_N")),
-        "rhythm": lambda one: words.rhythm(one.rhythm) if one.walk else "not run",
-        "elongation walking (cm)": lambda one: words.all_in_cm(one.walked_m) if one.walk else "not run",
     }
-    said: dict[str, Any] = {
-        "held": " ".join(map(_convergence_in_words, held)),
-        "walk": _walks_in_words(walks),
-        "worm": first.worm.label,
-        "coarse": by_worm[first.worm][0].at_holds("ring_length_m"),
-        "fewest": first.elements[0],
-        "fine": by_worm[first.worm][-1].at_holds("ring_length_m"),
-        "most": first.elements[-1],
-    }
+    said = {"held": " ".join(map(_convergence_in_words, held))}
     return findings("discretization", said, tabulated(readings, columns), ["method"], numbers)
 
 
@@ -133,19 +113,6 @@ def _convergence_in_words(found: Convergence) -> str:
         f"Held contractions of {found.worm.label} with {PRESETS_ELEMENTS} elements a side differ from those with "
         f"{found.elements[-1]} by {_in_words(found.of_presets)}; the fitted order "
         f"of convergence is {words.span(orders, digits=1)}{slow}."
-    )
-
-
-def _walks_in_words(walks: Sequence[Reading]) -> str:
-    good = [one for one in walks if one.walks]
-    bad = [f"{one.value:g} ({words.rhythm(one.rhythm)})" for one in walks if not one.walks]
-    elongations = np.array([one.walked_m for one in good])
-    spread = float((np.ptp(elongations, axis=0) / elongations.mean(axis=0)).max()) if good else None
-    periods = [words.number(one.closed.rhythm.period_s) for one in good]
-    return (
-        f"In closed loop {RIGID.label} walk 1-2-3 with {words.listed(f'{one.value:g}' for one in good)} elements a "
-        f"side, elongations within {words.in_percent(spread)} % and periods of {words.span(periods, digits=3)} s, "
-        f"and fail with {words.listed(bad)}."
     )
 
 

@@ -89,7 +89,7 @@ def add_chain(
         density_kg_per_m = np.full(n_elements, strands.one_number("linear_density_kg_per_m"))
     if shares is None:
         shares = np.ones((2, n_elements - 1))
-    middle = _middle_element(len(vertices_m)) if root is None else root
+    middle = (len(vertices_m) - 1) // 2 if root is None else root
 
     def add_element(parent: mujoco.MjsBody, element: int, joint_vertex: int, origin: Array) -> mujoco.MjsBody:
         place = vertices_m[joint_vertex]
@@ -165,10 +165,6 @@ def _add_pin(
     connect, bodies = mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtObj.mjOBJ_BODY
     for k, link in enumerate(links):
         add_row(spec, connect, bodies, f"pin_{crossing}_{k}", name, link.name, data=[0.0] * 12, **solver)
-
-
-def _middle_element(n_vertices: int) -> int:
-    return (n_vertices - 1) // 2
 
 
 class ChainMechanics(Mechanics):

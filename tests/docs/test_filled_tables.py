@@ -236,13 +236,6 @@ def test_a_wrong_marker_is_refused(docs: Path) -> None:
             filled(PAGE.replace(right, wrong), docs)
 
 
-def test_a_table_of_numbers_without_markers_is_found() -> None:
-    table = "| a | b |\n|---|---|\n" + "| 1.5 cm | -2 |\n" * 3
-    assert list(unfilled(f"text\n\n{table}\ntext\n")) == ["a"]
-    assert list(unfilled("| a | b |\n|---|---|\n" + "| `1.5` | 1-2-3 |\n" * 9)) == []
-    assert list(unfilled(PAGE.replace("-->\n\n", f"-->\n\n{table}\n"))) == []
-
-
 @pytest.mark.slow
 def test_a_list_of_runs_is_measured(tmp_path: Path) -> None:
     path = tmp_path / "planar.toml"

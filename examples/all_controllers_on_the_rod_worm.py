@@ -17,7 +17,6 @@ CONTROLLERS: dict[str, dict[str, object]] = {
     "synthetic nervous system": {"kind": "sns"},
     "the same, half driven": {"kind": "adaptive", "drive": 0.5},
     "heteroclinic channel": {"kind": "shc"},
-    "the same, by contact": {"kind": "shc", "feedback": "contact"},
     "phase chain, slowed": {"kind": "phase-chain", "slowing": 2.5},
     "sine wave": {"kind": "sine"},
     "timed wave": {"kind": "timed", "rise_s": 0.3, "hold_s": 0.6, "fall_s": 0.3, "interval_s": 0.9},

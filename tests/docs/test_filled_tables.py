@@ -77,15 +77,12 @@ STALE: tuple[str, ...] = (
     "challenge_wave_5ms.csv",
     "environments.csv",
     "firmware.csv",
-    "gaits.csv",
     "lems.csv",
     "pipes.csv",
     "riddle2025.csv",
     "robustness_three_segments.json",
     "slip.csv",
-    "speed.csv",
     "tolerance_windows.csv",
-    "tune_sns.csv",
     "tune_timed.csv",
     "uncertainty_turns.csv",
     "weak_middle.csv",
@@ -237,13 +234,6 @@ def test_a_wrong_marker_is_refused(docs: Path) -> None:
     ):
         with pytest.raises(FillError):
             filled(PAGE.replace(right, wrong), docs)
-
-
-def test_a_table_of_numbers_without_markers_is_found() -> None:
-    table = "| a | b |\n|---|---|\n" + "| 1.5 cm | -2 |\n" * 3
-    assert list(unfilled(f"text\n\n{table}\ntext\n")) == ["a"]
-    assert list(unfilled("| a | b |\n|---|---|\n" + "| `1.5` | 1-2-3 |\n" * 9)) == []
-    assert list(unfilled(PAGE.replace("-->\n\n", f"-->\n\n{table}\n"))) == []
 
 
 @pytest.mark.slow

@@ -7,7 +7,6 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
-import pytest
 from doc_commands import PAGES as MARKDOWN
 from doc_commands import ROOT
 from markdown_it import MarkdownIt
@@ -128,11 +127,3 @@ def test_only_listed_pages_have_long_sentences() -> None:
 
 def test_pages_begin_with_what_they_are_for() -> None:
     assert [page for page in PAGES if beginning(page) != ["h1", "paragraph_open"]] == []
-
-
-def test_words_sentences_and_beginnings_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    page = f"# A\n\n    annelid run\n\nThe slip\nper way `told for` is {'long ' * LONGEST}. It is short.\n"
-    monkeypatch.setitem(PAGES, "a.md", page)
-    assert [found for _, text in prose("a.md") for found in found_in(text)] == ["'slip per way': slip ratio"]
-    assert [sentence[:8] for sentence in long_sentences("a.md")] == ["The slip"]
-    assert beginning("a.md") == ["h1", "code_block"]

@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import errno
+import io
+import itertools
 import json
 import os
 import shutil
@@ -8,7 +10,7 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import h5py
 import numpy as np
@@ -21,7 +23,7 @@ from toy import N, SavedToyPlant, ToyController, ToyPlant, toy_config, without_d
 from annelid.errors import ConfigError, RunFileError
 from annelid.protocols import Recordable, Signal
 from annelid.references import entries
-from annelid.simulation import Run, container, loop, open_run, simulate
+from annelid.simulation import Run, container, digest, loop, open_run, simulate
 from annelid.simulation.container import RawWriter, Variable
 from annelid.simulation.runfile import SCHEMA_VERSION, read_config, verify_run
 
@@ -203,33 +205,17 @@ def test_an_overwritten_run_survives_a_failed_layout(tmp_path: Path, monkeypatch
 def test_a_disk_that_fills_up_ends_the_run_with_a_readable_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, at_write: int
 ) -> None:
-    """Every write from the given one on fails with ENOSPC after taking half of its bytes."""
+    """Every write from the given one on fails after taking half of its bytes."""
     monkeypatch.setattr(loop.RecordedRun, "flush_interval_s", 0.0)
-    monkeypatch.setattr(container, "open", lambda *args, **options: FullDisk(*args, **options), raising=False)
+    whole, count = digest.write_whole, itertools.count()
 
-    class FullDisk:
-        def __init__(self, path: Path, mode: str, buffering: int = -1) -> None:
-            self._file = open(path, mode, buffering=buffering)  # noqa: SIM115
-            self._count = 0
-            self._limited = mode == "r+b"
+    def write(file: BinaryIO, content: bytes) -> None:
+        if next(count) >= at_write:
+            file.write(content[: len(content) // 2])
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        whole(file, content)
 
-        def write(self, content: memoryview) -> int:
-            self._count += self._limited
-            if self._count == at_write and len(content) > 1:
-                return self._file.write(content[: len(content) // 2])
-            if self._count > at_write:
-                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-            return self._file.write(content)
-
-        def __getattr__(self, name: str) -> Any:
-            return getattr(self._file, name)
-
-        def __enter__(self) -> FullDisk:
-            return self
-
-        def __exit__(self, *error: object) -> None:
-            self._file.close()
-
+    monkeypatch.setattr(digest, "write_whole", write)
     with pytest.raises(RunFileError, match="No space left on device; what was written before is kept"):
         toy_run(tmp_path)
     run = open_run(tmp_path)
@@ -238,6 +224,16 @@ def test_a_disk_that_fills_up_ends_the_run_with_a_readable_file(
     assert 0 < run.data.sizes["time"] < 41
     np.testing.assert_array_equal(run.data["control_steps"], 5 * np.arange(run.data.sizes["time"]))
     assert not run.data["stretch_length"].isnull().any()
+
+
+def test_what_a_file_takes_in_parts_is_written_whole(tmp_path: Path) -> None:
+    class Slow(io.FileIO):
+        def write(self, content: Any) -> int:
+            return super().write(bytes(content[:11]))
+
+    with Slow(tmp_path / "slow", "wb") as file:
+        digest.write_whole(file, bytes(range(256)))  # type: ignore[arg-type]
+    assert (tmp_path / "slow").read_bytes() == bytes(range(256))
 
 
 def test_a_disk_that_recovers_for_the_last_words_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -22,7 +22,7 @@ from annelid_studies.riddle2023.examinations import EXAMINATIONS, timestep
 from annelid_studies.riddle2023.examinations.design import RIGID, held_elongation
 from annelid_studies.riddle2023.examinations.discretization import convergence_order
 from annelid_studies.riddle2023.examinations.friction import FRICTION
-from annelid_studies.riddle2023.examinations.noise import MAPS, handled_noise, is_even
+from annelid_studies.riddle2023.examinations.noise import MAPS, handled_noise
 from annelid_studies.riddle2023.examinations.noise import steady_tolerances as steady
 from annelid_studies.riddle2023.examinations.pins import tie_stiffness_N_per_m
 from annelid_studies.riddle2023.examinations.ranges import EQUAL, RANGES, compiled_ranges
@@ -137,10 +137,8 @@ def test_a_cell_has_one_run_for_each_seed_but_only_one_without_noise() -> None:
 def test_a_tolerance_is_steady_if_every_run_walks() -> None:
     cells = {(0.01, 0.0): [WAVE], (0.02, 0.0): [LIMP], (0.01, 0.001): [WAVE, SILENT], (0.02, 0.001): [WAVE, LIMP]}
     assert steady(cells, 0.0) == [0.01, 0.02]
-    assert steady(cells, 0.0, is_even) == [0.01]
     assert steady(cells, 0.001) == [0.02]
     assert handled_noise(cells) == 0.001
-    assert handled_noise(cells, is_even) == 0.0
     assert handled_noise({(0.01, 0.0): [SILENT]}) is None
 
 

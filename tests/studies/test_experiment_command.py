@@ -50,12 +50,6 @@ def test_results_are_kept_unless_forced(annelid: Command) -> None:
         assert Path(folder, file).read_text() == "mine"
 
 
-def test_an_unknown_figure_is_refused_with_the_nearest(annelid: Command, finished: Path) -> None:
-    done = annelid("draw", finished, "--figure", "trak")
-    assert done.exit_code == 2
-    assert "unknown figure 'trak': did you mean 'track'?" in done.sentence()
-
-
 def test_a_file_in_place_of_the_folder_of_runs_is_refused(annelid: Command, subtests: pytest.Subtests) -> None:
     Path("taken").write_text("mine", encoding="utf-8")
     for words in [

@@ -16,7 +16,7 @@ from annelid.control import SineController, TimedController
 from annelid.control.open_loop import SineWave, TimedWave
 from annelid.errors import ConfigError
 from annelid.protocols import Controller, Records, Sensation, Stateful
-from annelid.simulation import Run, simulate
+from annelid.simulation import simulate
 from annelid_studies.oscillators import HeteroclinicController, PhaseChainController
 from annelid_studies.oscillators.controllers import HeteroclinicChannel, PhaseChain
 
@@ -190,22 +190,8 @@ def planar(kind: str, duration_s: float, **fields: Any) -> RunConfig:
     return load_config("riddle2022-planar", {"controller": {"kind": kind, **fields}, "duration_s": duration_s})
 
 
-def joined_equal(first: Run, second: Run, whole: Run) -> None:
-    for name, variable in whole.data.variables.items():
-        if {"time", "frame"} & set(variable.dims) and name != "wall_time":
-            parts = [part.data[name].values for part in (first, second)]
-            np.testing.assert_array_equal(np.concatenate(parts), variable.values, err_msg=str(name))
-
-
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_planar_worm_contracts_in_order(kind: str, tmp_path: Path) -> None:
     score = rhythm_score(simulate(planar(kind, 7.5), tmp_path, progress=False))
     assert score.verdict == "ordered", score
     assert list(score.order[:6]) == [1, 2, 3, 1, 2, 3]
-
-
-def test_noise_is_continued_bit_for_bit(tmp_path: Path) -> None:
-    noisy = {"noise": 1e-3, "bias_per_s": 0.0, "feedback_gain_per_s": 0.0}
-    whole = simulate(planar("shc", 1.0, **noisy), tmp_path / "3", progress=False)
-    first = simulate(planar("shc", 0.4, **noisy), tmp_path / "1", progress=False)
-    joined_equal(first, simulate(planar("shc", 1.0, **noisy), tmp_path / "2", resume=first, progress=False), whole)

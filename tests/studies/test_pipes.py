@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +21,6 @@ from annelid_studies.pipes import (
     pipes_picture,
     trials,
 )
-from annelid_studies.tables import write_fields
 
 
 def reading(**changes: object) -> Reading:
@@ -58,14 +56,6 @@ def test_adaptation_is_all_that_the_adaptive_and_the_fixed_wave_differ_in() -> N
 def test_quick_trials_are_some_of_all() -> None:
     every = [one.case for one in trials()]
     assert all(one.case in every for one in trials(quick=True))
-
-
-def test_readings_are_written(tmp_path: Path) -> None:
-    readings = [reading(), reading(arena="taper", radius_m=0.0, passed=False, in_order=None, work_J_per_m=None)]
-    with write_fields(Reading, readings, tmp_path / "pipes.csv").open(newline="", encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
-    assert [row["passed"] for row in rows] == ["True", "False"]
-    assert rows[0]["command"] == "annelid run x"
 
 
 def test_the_picture_shows_whatever_there_is(tmp_path: Path) -> None:

@@ -1,17 +1,9 @@
 from __future__ import annotations
 
-from dataclasses import replace
-from pathlib import Path
-
 import numpy as np
 import pytest
-import xarray
 
-from annelid.analysis import nearest_frame
-from annelid.config import load_config
-from annelid.errors import RunFileError
 from annelid.morphology import MeshGeometry, helical_mesh
-from annelid.simulation.runfile import Run
 from annelid_studies.riddle2023.figures.rhombi import (
     actuated,
     deformation,
@@ -82,14 +74,3 @@ def test_actuated_rhombi_are_those_that_a_ring_runs_across(mesh: MeshGeometry) -
     for segment in range(mesh.n_segments):
         own = rhombus_plane(mesh) == mesh.ring_planes[segment]
         np.testing.assert_array_equal(distance_from_ring_m(mesh, segment)[own], 0.0)
-
-
-def test_times_and_runs_without_postures_are_refused() -> None:
-    data = xarray.Dataset({"crossing_position": ("frame", [0.0, 0.0, 0.0]), "frame_time": ("frame", [0.0, 0.1, 0.2])})
-    run = Run(Path("run.nc"), data, load_config("riddle2023-rods"), "complete", "")
-    assert nearest_frame(run, 0.14) == 1
-    with pytest.raises(RunFileError, match=r"no picture at 1\.5 s: it was recorded from 0 to 0\.2 s"):
-        nearest_frame(run, 1.5)
-    for poor in (data.isel(frame=slice(0)), data.drop_vars("crossing_position")):
-        with pytest.raises(RunFileError, match="no recorded postures"):
-            nearest_frame(replace(run, data=poor), 0.1)

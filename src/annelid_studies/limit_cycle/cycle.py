@@ -3,7 +3,7 @@
 The return map of a section is iterated until the orbit closes; state-transition
 matrices along it give the Floquet multipliers and the phase response (Seydel 2010, ch. 7; Ermentrout & Terman 2010,
 ch. 8). Steps of finite length are not a flow: their trivial multiplier is not 1, and kinks within a step take it
-further away; `Continuous` and `Piecewise` of `annelid_studies.limit_cycle.flow` take care of both.
+further away; `Continuous` of `annelid_studies.limit_cycle.flow` takes care of both.
 """
 
 from __future__ import annotations
@@ -65,7 +65,6 @@ class LimitCycle:
         closing_error: Largest distance between beginning and end in any state, as a share of its range.
         time_s: Instants, s, from 0 to the period, ``(n_phases + 1,)``.
         state: Shape ``(n_phases + 1, n_states)``.
-        switch_time_s: When a switch moves, s, ``(n_moves,)``.
         multipliers: Floquet multipliers, by falling magnitude, ``(n_states,)``, complex.
         trivial: Index of the multiplier nearest to 1, whose eigenvector is along the orbit.
         phase_response: Infinitesimal phase response curves, ``(n_phases + 1, n_states)``: by how many seconds a
@@ -78,7 +77,6 @@ class LimitCycle:
     closing_error: float
     time_s: Array
     state: Array
-    switch_time_s: Array = field(repr=False)
     multipliers: NDArray[np.complex128]
     trivial: int
     phase_response: Array = field(repr=False)
@@ -238,7 +236,6 @@ def find_limit_cycle(
         closing_error=closing,
         time_s=orbit.time[arcs] * flow.timestep_s,
         state=state,
-        switch_time_s=orbit.time[orbit.moved] * flow.timestep_s,
         multipliers=multipliers,
         trivial=int(np.argmin(np.abs(multipliers - 1.0))),
         phase_response=response / (response * velocity).sum(axis=1, keepdims=True),

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from annelid.control import lengthening_m
 from annelid.protocols import Array, Sensation
 
-
 TIME_CONSTANT_S = 0.03
 """Of the first-order filter on lengths and loads."""
 LEAST_LOAD_N = 1.0

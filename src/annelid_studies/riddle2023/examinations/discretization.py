@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -63,10 +63,7 @@ class Convergence(NamedTuple):
 
     worm: Worm
     elements: Sequence[int]  # Numbers of elements, the finest mesh last
-    # For each quantity its relative difference from the finest, root mean square over the segments, shape ``(n_meshes -
-    # 1,)``
-    difference: Mapping[str, Array]
-    of_presets: Mapping[str, float]  # For each quantity that with the presets' mesh
+    of_presets: Mapping[str, float]  # For each quantity the difference of the presets' mesh from the finest, relative
     order: Mapping[str, float | None]  # For each quantity the fitted order of convergence
 
 
@@ -77,7 +74,7 @@ def measure_convergence(readings: Sequence[Reading]) -> Convergence:
     difference = {name: np.array([_apart(name, one, finest) for one in coarser]) for name in QUANTITIES}
     of_presets = {name: float(apart[n.index(PRESETS_ELEMENTS)]) for name, apart in difference.items()}
     order = {name: convergence_order(n, apart, most) for name, apart in difference.items()}
-    return Convergence(finest.worm, elements, difference, of_presets, order)
+    return Convergence(finest.worm, elements, of_presets, order)
 
 
 def _apart(quantity: str, one: Reading, other: Reading) -> float:
@@ -88,9 +85,7 @@ def _apart(quantity: str, one: Reading, other: Reading) -> float:
 
 def _examine(store: Store, effort: Effort) -> Findings:
     readings = design.read(_points(effort), store)
-    by_worm = design.by_worm(readings)
-    held = [measure_convergence(own) for own in by_worm.values()]
-    first = held[0]
+    held = [measure_convergence(own) for own in design.by_worm(readings).values()]
     numbers: dict[str, Number] = {}
     for found in held:
         for name, apart in found.of_presets.items():
@@ -103,14 +98,7 @@ def _examine(store: Store, effort: Effort) -> Findings:
         "elongation held (cm)": lambda one: words.all_in_cm(one.held_m),
         "force held (N)": lambda one: words.each_in_unit(one.at_holds("force_N")),
     }
-    said: dict[str, Any] = {
-        "held": " ".join(map(_convergence_in_words, held)),
-        "worm": first.worm.label,
-        "coarse": by_worm[first.worm][0].at_holds("ring_length_m"),
-        "fewest": first.elements[0],
-        "fine": by_worm[first.worm][-1].at_holds("ring_length_m"),
-        "most": first.elements[-1],
-    }
+    said = {"held": " ".join(map(_convergence_in_words, held))}
     return findings("discretization", said, tabulated(readings, columns), ["method"], numbers)
 
 

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from math import sqrt
-from operator import attrgetter
 from typing import Any, NamedTuple
 
 from annelid.analysis import RhythmScore
-from annelid.config import field_value
 from annelid.experiment import Case, Store
 from annelid_studies.riddle2023 import words
 from annelid_studies.riddle2023.contents import Findings, Number, examination, findings
@@ -18,12 +15,8 @@ from annelid_studies.riddle2023.words import MM
 from annelid_studies.tables import tabulated
 from annelid_studies.worms import CHAIN, Effort
 
-EVEN = 0.9
-"""Least regularity of a wave that does not limp."""
-
 Cells = Mapping[tuple[float, float], Sequence[RhythmScore]]
 """The runs of each (tolerance, noise), both in m."""
-ONE_WAVE: Callable[[RhythmScore], bool] = attrgetter("is_one_wave")
 
 
 @dataclass(frozen=True)
@@ -70,21 +63,16 @@ def _cases(effort: Effort) -> list[Case]:
     return [*mapped, *NOISY_AT_THE_PAPERS_STEP] if effort == "full" else mapped
 
 
-def is_even(score: RhythmScore) -> bool:
-    """Whether a rhythm is the paper's wave and does not limp."""
-    return score.is_one_wave and words.number(score.regularity) >= EVEN
-
-
-def steady_tolerances(cells: Cells, noise_m: float, wanted: Callable[[RhythmScore], bool] = ONE_WAVE) -> list[float]:
-    """Returns the tolerances at which every run with this noise has the wanted rhythm, m, rising."""
+def steady_tolerances(cells: Cells, noise_m: float) -> list[float]:
+    """Returns the tolerances at which every run with this noise is one wave, m, rising."""
     return sorted(
-        tolerance for (tolerance, noise), scores in cells.items() if noise == noise_m and all(map(wanted, scores))
+        t for (t, noise), scores in cells.items() if noise == noise_m and all(one.is_one_wave for one in scores)
     )
 
 
-def handled_noise(cells: Cells, wanted: Callable[[RhythmScore], bool] = ONE_WAVE) -> float | None:
-    """Returns the largest noise at which some tolerance has the wanted rhythm in every run, m; None if none has."""
-    return max((noise for _, noise in cells if steady_tolerances(cells, noise, wanted)), default=None)
+def handled_noise(cells: Cells) -> float | None:
+    """Returns the largest noise at which every run of some tolerance is one wave, m; None if there is none."""
+    return max((noise for _, noise in cells if steady_tolerances(cells, noise)), default=None)
 
 
 class _Read(NamedTuple):
@@ -93,7 +81,6 @@ class _Read(NamedTuple):
     chart: NoiseMap
     cells: Cells
     window: Sequence[float]
-    even_window: Sequence[float]
 
     @property
     def worm(self) -> Worm:
@@ -105,10 +92,7 @@ def _examine(store: Store, effort: Effort) -> Findings:
         chart: {place: [store[case].rhythm for case in cell] for place, cell in chart.cells().items()}
         for chart in MAPS[effort]
     }
-    maps = [
-        _Read(chart, cells, steady_tolerances(cells, 0.0), steady_tolerances(cells, 0.0, is_even))
-        for chart, cells in mapped.items()
-    ]
+    maps = [_Read(chart, cells, steady_tolerances(cells, 0.0)) for chart, cells in mapped.items()]
     noisy_maps = [one for one in maps if max(one.chart.noises_m) > 0]
     numbers: dict[str, Number] = {}
     for one in maps:
@@ -117,9 +101,6 @@ def _examine(store: Store, effort: Effort) -> Findings:
         numbers[f"window_{one.worm.name}"] = _in_mm(one.window)
     found: dict[str, Any] = {
         "windows": words.by_worm(maps, lambda one: _in_mm(one.window)),
-        "even_windows": words.by_worm(maps, lambda one: _in_mm(one.even_window)),
-        "by_noise": "; ".join(map(_by_noise, noisy_maps)),
-        **_of_sensor(max(noise for one in maps for noise in one.chart.noises_m)),
         "papers": PAPERS.label,
     }
     if effort == "full":
@@ -139,8 +120,7 @@ def _examine(store: Store, effort: Effort) -> Findings:
         for one in maps
         for noise in one.chart.noises_m
     ]
-    remarks = ["thresholds", "sensor", effort]
-    return findings("noise", found, tabulated(rows, _COLUMNS), remarks, numbers)
+    return findings("noise", found, tabulated(rows, _COLUMNS), [effort], numbers)
 
 
 _Row = tuple[_Read, float, Sequence[RhythmScore]]
@@ -158,8 +138,7 @@ _COLUMNS: Mapping[str, Callable[[_Row], str]] = {
     "worm": lambda row: row[0].worm.label,
     "noise (mm)": lambda row: f"{MM * row[1]:g}",
     "all walk at (mm)": lambda row: _in_mm(steady_tolerances(row[0].cells, row[1])).removesuffix(" mm"),
-    "walk 1-2-3": lambda row: f"{sum(map(ONE_WAVE, row[2]))} of {len(row[2])}",
-    "evenly": lambda row: str(sum(map(is_even, row[2]))),
+    "walk 1-2-3": lambda row: f"{sum(score.is_one_wave for score in row[2])} of {len(row[2])}",
     "other order": _of_kind("other order"),
     "disordered": _of_kind("disordered"),
     "silent": _of_kind("silent"),
@@ -170,26 +149,6 @@ _COLUMNS: Mapping[str, Callable[[_Row], str]] = {
 
 def _in_mm(lengths_m: Sequence[float]) -> str:
     return f"{words.listed(f'{MM * length:g}' for length in lengths_m)}{' mm' if lengths_m else ''}"
-
-
-def _by_noise(one: _Read) -> str:
-    parts = [
-        f"{_in_mm(steady_tolerances(one.cells, noise))} under noise of {MM * noise:g} mm"
-        for noise in one.chart.noises_m[1:]
-    ]
-    return f"{one.worm.label} (own tolerance {MM * one.worm.tolerance_m:g} mm), {', '.join(parts)}"
-
-
-def _of_sensor(most_m: float) -> dict[str, Any]:
-    """What noise of a size on every spring is on what the sensor compares."""
-    config = RIGID.case(None).config
-    n_springs = field_value(config, "body.mesh.n_helices") // 2
-    return {
-        "step_ms": MM * config.clock.control_timestep_s,
-        "n_springs": n_springs,
-        "most_mm": MM * most_m,
-        "mean_mm": MM * most_m / sqrt(n_springs),
-    }
 
 
 NOISE = examination("noise", _cases, _examine)

@@ -15,7 +15,6 @@ from annelid_studies.riddle2023.contents import Findings, examination, findings
 from annelid_studies.riddle2023.examinations import design
 from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, SOFT, Columns, Point, Reading
 from annelid_studies.riddle2023.examinations.ranges import compiled_ranges
-from annelid_studies.riddle2023.words import MM, PERCENT
 from annelid_studies.tables import tabulated
 from annelid_studies.worms import TIGHT_CHAIN, Effort, chain, fast, one_after_the_other, rods
 
@@ -59,10 +58,15 @@ def _tied(stiffness: float) -> dict[str, Any]:
     }
 
 
-_OWN_DAMPING = rods({**one_after_the_other(), "body.rings.length_range_m": compiled_ranges()})
 _DAMPING = "body.strands.damping_time_s"
 # Muscles and damping as the rods with soft crossings have them, so that the pins alone differ.
-_HELD_TIGHT = _OWN_DAMPING.but({_DAMPING: field_value(fast().config, _DAMPING)})
+_HELD_TIGHT = rods(
+    {
+        **one_after_the_other(),
+        "body.rings.length_range_m": compiled_ranges(),
+        _DAMPING: field_value(fast().config, _DAMPING),
+    }
+)
 
 
 def _points(effort: Effort) -> list[Point]:
@@ -87,8 +91,6 @@ def _examine(store: Store, effort: Effort) -> Findings:
     chains, sprung, [tight] = groups[PAPERS], groups[SOFT], groups[RIGID]
     paper = chains[0]
     paper_m, tight_m = paper.held_m[0], tight.held_m[0]
-    own_m = design.held_elongation(store[_OWN_DAMPING])[0]
-    walked = [one for one in sprung if one.walk]
     common = [one for one in chains if sprung[0].value <= one.value <= sprung[-1].value]
     largest = max(abs(one.held_m[0] / _between(sprung, one.value) - 1.0) for one in common)
     found: dict[str, Any] = {
@@ -104,16 +106,8 @@ def _examine(store: Store, effort: Effort) -> Findings:
         "common": words.listed(f"{one.value:.0f}" for one in common),
         "largest": largest,
         "alike": ": the stiffness of the pins is what the two formulations have in common" if largest < 0.15 else "",
-        "tolerance_mm": MM * SOFT.tolerance_m,
-        "own_stiffness": tie_stiffness_N_per_m(fast()),
-        "ordered": words.listed(f"{one.value:g}" for one in walked if one.walks),
-        "others": words.listed(f"{one.value:g} ({words.kind(one.closed.rhythm)})" for one in walked if not one.walks),
-        "rigid_tolerance_mm": MM * RIGID.tolerance_m,
-        "rigid_rhythm": words.rhythm(tight.rhythm),
-        "own": own_m,
-        "own_beside": _beside(own_m, tight_m),
     }
-    remarks = ["formulations", "closed_loop", "damping"]
+    remarks = ["formulations", "damping"]
     columns: Columns = {
         "worm": lambda one: one.worm.label,
         "tie (N/m)": lambda one: _rounded(one.value) if one is not tight else "rigid",
@@ -140,15 +134,4 @@ def _rounded(stiffness: float) -> str:
     return f"{float(f'{stiffness:.3g}'):,g}"
 
 
-def _beside(value: float, reference: float) -> str:
-    difference = value / reference - 1.0
-    if abs(difference) < 0.005:
-        return "the same as"
-    return f"{PERCENT * abs(difference):.0f} % {'above' if difference > 0 else 'below'}"
-
-
-def _cases(effort: Effort) -> list[Case]:
-    return [*design.cases_of(_points(effort)), _OWN_DAMPING]
-
-
-PINS = examination("pins", _cases, _examine)
+PINS = examination("pins", lambda effort: design.cases_of(_points(effort)), _examine)

@@ -75,7 +75,6 @@ STALE: tuple[str, ...] = (
     "challenge_wave_2ms.csv",
     "challenge_wave_5ms.csv",
     "firmware.csv",
-    "lems.csv",
     "pipes.csv",
     "riddle2025.csv",
     "robustness_three_segments.json",

@@ -158,7 +158,7 @@ def test_what_a_written_worm_lacks_is_said() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         mjcf_text(worm(RODS, **{"body.mesh.elements_per_side": 1}))
-    with pytest.raises(ConfigError, match="arena.backward_friction = 2.0 cannot be written as MJCF"):
+    with pytest.raises(ConfigError, match=r"arena\.backward_friction = 2\.0 cannot be written as MJCF"):
         mjcf_text(worm(RODS, **{"arena.backward_friction": 2.0}))
 
 

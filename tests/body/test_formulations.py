@@ -158,6 +158,14 @@ def test_what_a_written_worm_lacks_is_said() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         mjcf_text(worm(RODS, **{"body.mesh.elements_per_side": 1}))
+    with pytest.raises(ConfigError, match="arena.backward_friction = 2.0 cannot be written as MJCF"):
+        mjcf_text(worm(RODS, **{"arena.backward_friction": 2.0}))
+
+
+def test_a_body_that_the_engine_refuses_names_the_fields_to_change() -> None:
+    light = {"body.strands.linear_density_kg_per_m": 1e-6, "body.strands.radius_m": 1e-4}
+    with pytest.raises(ConfigError, match=r"engine refuses this body: a part is too light, so raise body\.strands"):
+        compile_spec(build_spec(load_config("riddle2023", light)))
 
 
 def test_rods_of_one_element_a_side_stand_as_the_engine_s_do() -> None:

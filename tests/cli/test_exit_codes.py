@@ -7,10 +7,12 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
 from annelid.cli import entry
+from annelid.errors import RunKilled
 from annelid.experiment.sweep import Sweep
 from outcome import STUDY, Command
 
@@ -73,6 +75,13 @@ def test_a_search_that_finds_no_gait_says_so(annelid: Command) -> None:
     done = annelid("tune", *words, "--trials", "1", "--quiet", "--jobs", "1")
     assert done.exit_code == entry.EXIT_ALL_FAILED, done.err
     assert "no trial walked" in done.err
+
+
+def test_a_study_whose_worker_dies_again_and_again_says_so(annelid: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    killed = Mock(side_effect=RunKilled("its worker died 3 times"))
+    monkeypatch.setattr("annelid_studies.riddle2023.paper.reproduce", killed)
+    done = annelid("paper", "--quiet")
+    assert (done.exit_code, done.sentence()) == (entry.EXIT_SOME_FAILED, "its worker died 3 times")
 
 
 # One process a row: what is told there goes to streams of the system.

@@ -46,12 +46,19 @@ def test_bad_input_ends_in_one_sentence_and_leaves_nothing(
     assert not Path("runs").exists(), "no empty folder stays behind"
 
 
+def test_a_folder_that_cannot_be_written_is_refused_first(annelid: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("annelid.cli.common.os.access", lambda *_: False)
+    words = ("export", "riddle2023-rods", "--to", "mjcf", "-o", "worm.xml")
+    assert "worm.xml cannot be written: . does not allow it" in annelid(*words).sentence()
+
+
 def test_wrong_usage_is_exit_2_without_a_traceback(annelid: Command) -> None:
     for arguments in (
         ("run", "--bogus"),
         ("run", "--duration", "nan"),
         ("crawl",),
         ("draw", "somewhere", "-o", "frame.png", "--video", "v.mp4"),
+        ("draw", "somewhere", "-o", "a.png", "--figure", "track", "--time", "1"),
     ):
         done = annelid(*arguments)
         assert done.exit_code == 2

@@ -7,6 +7,7 @@ from importlib import resources
 from importlib.resources.abc import Traversable
 from os.path import isfile
 from pathlib import Path
+from textwrap import indent
 from typing import Any
 
 from annelid.config.checking import check_config, field_value, present_fields, whole_path
@@ -52,11 +53,7 @@ def preset_text(source: str | Path) -> str:
     """
     load_config(source)
     (_, text, _), *bases = reversed(_layers(source))
-    return "".join([text, *(f"\n# {name}, which it extends:\n\n{_commented(base)}" for name, base, _ in bases)])
-
-
-def _commented(text: str) -> str:
-    return "".join(f"# {line}".rstrip() + "\n" for line in text.splitlines())
+    return "".join([text, *(f"\n# {name}, which it extends:\n\n{indent(base, '# ', bool)}" for name, base, _ in bases)])
 
 
 def arena_names() -> list[str]:

@@ -178,7 +178,8 @@ def comparison_table(comparison: Comparison) -> Table:
     caption = f"in brackets: difference to {comparison.labels[0]}; pp: peak to peak"
     table = _side_by_side("quantity", comparison.labels, caption)
     table.add_row("status", *(status.replace("_", " ") for status in comparison.statuses))
-    table.add_row("order of contractions", *map(_first_of_order, comparison.orders))
+    orders = ("-".join(map(str, order[:_ONSETS_SHOWN])) + _and_more(order) for order in comparison.orders)
+    table.add_row("order of contractions", *(order or UNKNOWN for order in orders))
     for name, values in comparison.numbers.items():
         if NUMBERS[name].label and any(value is not None for value in values):
             shares = (_percents(share, lambda percent: f"{percent:+.1f}") for share in comparison.differences(name))
@@ -195,7 +196,8 @@ def fields_table(comparison: Comparison) -> Table:
     table = _side_by_side("field of the configuration", comparison.labels, caption if other_kinds else None)
     for field, values in comparison.fields.items():
         if not (other_kinds and field.startswith(("body.", "arena.")) and LACKING in values):
-            table.add_row(field, *(UNKNOWN if value is LACKING else _setting(value) for value in values))
+            texts = ("not set" if one is None else UNKNOWN if one is LACKING else toml_value(one) for one in values)
+            table.add_row(field, *(shortened(text, MOST_CHARACTERS) for text in texts))
     return table
 
 
@@ -286,16 +288,6 @@ def _about_rigid_crossings(numbers: Summary) -> str:
     gap = f"{1e3 * (theirs.pin_gap_max_m or 0.0):.0f} mm"
     theirs_give = f"{FORMULATION} has the paper's soft crossings, which part by up to {gap}"
     return f"Here crossings are rigid, and {times}: {theirs_give}."
-
-
-def _first_of_order(order: Sequence[int]) -> str:
-    if not order:
-        return UNKNOWN
-    return "-".join(map(str, order[:_ONSETS_SHOWN])) + _and_more(order)
-
-
-def _setting(value: Any) -> str:
-    return "not set" if value is None else shortened(toml_value(value), MOST_CHARACTERS)
 
 
 def _percents(shares: Value, form: Callable[[float], str]) -> str:

@@ -18,7 +18,6 @@ SHEAR_OVER_YOUNG = 1.0 / 1.5
 
 # Samples and postures of a study's runs: enough for its numbers and for a picture at 1.5 s, a tenth of the disk.
 _SPARSE = {"record.signals_interval_s": 0.01, "record.frames_interval_s": 0.5}
-# Milliseconds of one core for each evaluation of the dynamics, only to start the longest runs first.
 
 
 @dataclass(frozen=True)
@@ -68,11 +67,6 @@ class Case:
         return replace(self, changes={**self.changes, **changes})
 
 
-def absolute(source: str) -> str:
-    """Returns the name of a preset as it is, and the path of a TOML file from the root."""
-    return Path(source).resolve().as_posix() if source.endswith(".toml") else source
-
-
 def write_worm(path: Path, source: str, fields: Mapping[str, Any], heading: Sequence[str]) -> None:
     """Writes a worm as a file that ``annelid run`` takes: the preset or file that it extends, and what differs.
 
@@ -84,4 +78,5 @@ def write_worm(path: Path, source: str, fields: Mapping[str, Any], heading: Sequ
         fields: What differs, by dotted path.
         heading: Lines of a comment above.
     """
-    write_text(path, toml_text({"extends": absolute(source), **nested(fields)}, "\n".join(heading)))
+    base = Path(source).resolve().as_posix() if source.endswith(".toml") else source
+    write_text(path, toml_text({"extends": base, **nested(fields)}, "\n".join(heading)))

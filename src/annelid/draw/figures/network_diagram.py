@@ -20,10 +20,10 @@ from numpy.typing import NDArray
 from annelid.config import RunConfig
 from annelid.draw.canvas import WIDTH_IN, canvas, plain, save
 from annelid.draw.figures import RUN_FIGURES
+from annelid.draw.plots import plot_path
 from annelid.errors import RunFileError
 from annelid.nervous import Network
 from annelid.nervous.tables import Effect, effect_of
-from annelid.output import with_suffix
 from annelid.simulation import Run, build_plant
 
 if TYPE_CHECKING:
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 
 Path2D = NDArray[np.complexfloating]
 
-NETWORK_SUFFIXES = (".png", ".pdf", ".svg")
 SYMBOLS = {"contraction": "U1", "expansion": "U2", "sensory": "U3", "relay": "U4"}
 """The paper's symbols of the neurons of a segment, by the part of a neuron's name before its segment's number."""
 _GREY, _ARROW = "#595959", "#4d4d4d"
@@ -73,7 +72,7 @@ def network_figure(network: Network, path: str | Path) -> Path:
     Raises:
         RunFileError: The file has another suffix or cannot be written.
     """
-    path = with_suffix(path, NETWORK_SUFFIXES, "a network", default=".png")
+    path = plot_path(path)
     with _drawn(network) as figure:
         _draw_key(figure, network)
         return save(figure, path, bbox_inches="tight", pad_inches=0.1)

@@ -103,7 +103,9 @@ def _write_in_cells(axes: Axes, mesh: Any, grid: np.ma.MaskedArray) -> None:
 
 
 def _map(figure: Figure, axes: Axes, data: xr.Dataset, fields: Sequence[str], name: str) -> None:
-    values = _without_repeats(data[name])
+    values = data[name]
+    if "repeat" in values.dims:
+        values = values.mean("repeat", keep_attrs=True)
     along_x, along_y = (data[field] for field in fields)
     (x, x_ticks), (y, y_ticks) = _axis(along_x.values), _axis(along_y.values)
     if fields[0] in values.dims:
@@ -134,10 +136,6 @@ def _colors(values: np.ndarray) -> dict[str, Any]:
         return {"cmap": COLORS}
     reach = float(np.abs(known).max())
     return {"cmap": SIGNED, "vmin": -reach, "vmax": reach}
-
-
-def _without_repeats(values: xr.DataArray) -> xr.DataArray:
-    return values.mean("repeat", keep_attrs=True) if "repeat" in values.dims else values
 
 
 def _axis(values: np.ndarray) -> tuple[np.ndarray, list[tuple[float, str]]]:

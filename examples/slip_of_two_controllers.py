@@ -21,7 +21,7 @@ from annelid import Run
 from annelid.experiment import Case, Store
 
 CLOCK = {"clock.control_timestep_s": 0.002, "record.signals_interval_s": 0.02, "duration_s": 12.0}
-CONTROLLERS: dict[str, dict[str, object]] = {"channel": {"kind": "shc"}} | {
+CONTROLLERS = {"channel": {"kind": "shc"}} | {
     f"sine, waves: {waves}, {period_s:g} s": {"kind": "sine", "period_s": period_s, "waves": waves}
     for waves in (1, 2, 3)
     for period_s in (1.0, 2.0, 4.0)

@@ -59,7 +59,6 @@ NO_WORM = {
 """Result files that are not of presets, and why."""
 
 STALE: tuple[str, ...] = (
-    "arena_contacts.csv",
     "challenge.csv",
     "challenge_10ms.csv",
     "challenge_2ms_runs.csv",
@@ -75,9 +74,7 @@ STALE: tuple[str, ...] = (
     "challenge_tune_5ms.csv",
     "challenge_wave_2ms.csv",
     "challenge_wave_5ms.csv",
-    "environments.csv",
     "firmware.csv",
-    "lems.csv",
     "pipes.csv",
     "riddle2025.csv",
     "robustness_three_segments.json",

@@ -6,7 +6,6 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -20,34 +19,52 @@ class Interrupted:
     def find_spec(self, name, path=None, target=None):
         if name == {module!r}:
             sys.meta_path.remove(self)
-            os.kill(os.getpid(), signal.SIGINT)
+            os.kill(os.getpid(), signal.{signal})
 sys.meta_path.insert(0, Interrupted())
-sys.argv = ["annelid", "list", "presets"]
+sys.argv = ["annelid", "run", "riddle2023-rods", "--duration", "0.1", "--no-video", "--out", "out"]
 runpy.run_module("annelid", run_name="__main__")
 """
 
 
-def interrupted(module: str, handler: Callable[..., object] | signal.Handlers) -> subprocess.CompletedProcess[str]:
-    """Runs a command that is interrupted where it looks for a module, with what its parent does with interruptions."""
-    return subprocess.run(
-        [sys.executable, "-c", AT_IMPORT.format(module=module)],
+def heed_interruption() -> None:
+    """Undoes what nohup and background jobs of a shell do."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.mark.parametrize("module", ["annelid.cli", "mujoco._specs"])
+def test_interrupted_while_it_loads_it_ends_in_a_sentence(tmp_path: Path, module: str) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", AT_IMPORT.format(module=module, signal="SIGINT")],
+        cwd=tmp_path,
         capture_output=True,
         text=True,
         check=False,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, handler),  # type: ignore[arg-type]
+        preexec_fn=heed_interruption,
         timeout=120,
     )
+    assert done.stderr == "annelid: interrupted\n"
+    assert done.returncode == 130
 
 
-def test_interrupted_while_it_loads_it_says_nothing_or_a_sentence() -> None:
-    done = interrupted("annelid.cli", signal.SIG_DFL)
-    assert (done.returncode, done.stderr) == (-signal.SIGINT, "")
-    done = interrupted("annelid.config.loading", signal.SIG_DFL)
-    assert (done.returncode, done.stderr) == (130, "annelid: interrupted\n")
+def test_terminated_while_it_loads_it_says_nothing(tmp_path: Path) -> None:
+    code = AT_IMPORT.format(module="typer", signal="SIGTERM")
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False, timeout=120
+    )
+    assert (done.returncode, done.stderr) == (-signal.SIGTERM, "")
 
 
-def test_where_interruptions_are_ignored_they_stay_so() -> None:
-    done = interrupted("typer", signal.SIG_IGN)
+def test_where_interruptions_are_ignored_they_stay_so(tmp_path: Path) -> None:
+    code = AT_IMPORT.replace('"run", "riddle2023-rods", "--duration", "0.1", "--no-video", "--out", "out"', '"presets"')
+    done = subprocess.run(
+        [sys.executable, "-c", code.format(module="typer", signal="SIGINT")],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_IGN),
+        timeout=120,
+    )
     assert done.returncode == 0, done.stderr
     assert "riddle2023" in done.stdout
 

@@ -67,11 +67,15 @@ __getattr__, __dir__ = lazy(
         "Diagram": "annelid.draw.network_figure draws a network, and its method table() has the conductances",
         "Factors": _MODULATION,
         "Modulated": _MODULATION,
+        "adaptive_half_centre": "adaptive_peristalsis_network has such half-centres",
+        "network_of_tables": "Network.from_toml builds a network from its text",
         "ModulatorySynapse": _MODULATION,
         **dict.fromkeys(
             ("addition", "subtraction", "division", "multiplication", "differentiation", "integration"), _ARITHMETIC
         ),
-        **dict.fromkeys(("half_centre_of_period", "oscillation_periods", "find_period"), _PERIODS),
+        **dict.fromkeys(
+            ("half_centre_network", "half_centre_of_period", "oscillation_periods", "find_period"), _PERIODS
+        ),
         **dict.fromkeys(("Signals", "transmission"), _SIGNALS),
     },
     ("annelid_studies.oscillators", "annelid_lab.sns_toolbox"),

@@ -147,7 +147,8 @@ def test_copies_step_as_the_worm_does() -> None:
     settle(plant, controller, 0.001, 1.0)
     loop = ClosedLoop(plant, controller, 0.001)
     sensation = plant.sense()
-    copies, before = (part.repeat(3, axis=0) for part in loop.present())
+    state, switches = loop.present()
+    copies, before = state.repeat(3, axis=0), switches.repeat(3, axis=0)
     for _ in range(200):
         copies, before = loop.step(copies, before)
         sensation = plant.step(controller.step(sensation))

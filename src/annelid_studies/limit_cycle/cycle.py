@@ -211,6 +211,7 @@ def find_limit_cycle(
     """
     orbit = _first_return(flow, state, switches, section, longest_s)
     state, switches = orbit.state[-1:], orbit.switches[-1:]
+    closing = np.inf
     for _ in range(_MOST_RETURNS):
         orbit = _first_return(flow, state, switches, section, longest_s)
         closing = float((np.abs(orbit.state[-1] - state[0]) / orbit.range).max())

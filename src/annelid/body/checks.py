@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from math import cos, degrees, hypot, pi, radians, tan
 from statistics import fmean
 
-from annelid.body.estimates import rhombus_of, soft_constraint
+from annelid.body.estimates import WALKS_FROM, rhombus_of, soft_constraint
 from annelid.body.mesh import MeshBody
 from annelid.config.answers import Finding
 from annelid.config.run import RunConfig
@@ -107,8 +107,10 @@ def tolerance_findings(config: RunConfig, body: MeshBody, window: tuple[float, f
         return
     shape, tolerance = rhombus_of(body), config.sensor.tolerance_m
     most = shape.longest_m - shape.along_m
-    low, high = window or (0.02 * most, 0.25 * most)
-    instead = f"set about {(low + high) / 2 if window else 0.12 * most:.2g}"
+    # Muscles that lag let segments pass each other at more than half of that (docs/robust.md).
+    share = 0.5 if body.rings.model_dump().get("activation_dynamics", False) else 0.25
+    low, high = window or (0.02 * most, share * most)
+    instead = f"set about {(low + high) / 2 if window else 0.48 * high:.2g}"
     if tolerance >= most:
         problem = f"a segment lengthens by at most {most:.2g} m, to straight strands: its sensor never switches off"
     elif window and low >= high:
@@ -124,11 +126,10 @@ def tolerance_findings(config: RunConfig, body: MeshBody, window: tuple[float, f
             "the wave may stop"
         )
     elif tolerance > high:
-        problem = (
-            f"that is over a quarter of the {most:.2g} m by which a segment can lengthen: sensors may never switch off"
-        )
+        lengthens = f"{most:.2g} m by which a segment can lengthen"
+        problem = f"that is over {100 * share:.0f} % of the {lengthens}: sensors may never switch off"
     elif tolerance < low:
-        lift = low if window else 0.1 * most
+        lift = low / WALKS_FROM if window else 0.1 * most
         problem = f"a contracting neighbour lengthens a segment by up to {lift:.2g} m: sensors may never switch on"
     else:
         return

@@ -30,6 +30,8 @@ _BENDING = 1.3
 ESTIMATE_FACTOR = 2.0
 MOST_SHRUNK_AT_REST = 2 / 3
 """Length over that at rest to which actuators may draw a ring before anything is activated."""
+WALKS_FROM = 0.75
+"""Of the lift by the neighbours: the smallest tolerance with which the worm walks, within 3 mm in five cases."""
 
 
 def rhombus_of(body: MeshBody) -> Rhombus:

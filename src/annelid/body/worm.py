@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 
 from annelid.body.actuators import ActuatorKind
 from annelid.body.checks import ground_findings, material_findings, mesh_findings, tolerance_findings
-from annelid.body.estimates import rhombus_of
+from annelid.body.estimates import WALKS_FROM, rhombus_of
 from annelid.body.formulations import FormulationKind
 from annelid.body.mesh import MeshBody
 from annelid.config.answers import Finding
@@ -97,24 +97,26 @@ class WormBody(MeshBody):
 
         Below, contracting neighbours lift a segment at rest out of its tolerance. Above, a segment that lets go is back
         within it before the next has left it: all sensors say "at rest", and nothing contracts again. The middle of
-        both is the tolerance to set. Fitted to the paper's robot of rods under a timed wave, with moduli of 0.3 to 2
-        GPa, friction of 0.05 to 1 and damping times of 0.05 to 0.36 s, within 5 mm (docs/robust.md). The stiffness
-        enters as ``sqrt(EI / (k s^3))``, with the springs' rate k and the side s of a rhombus: stiffer strands spread a
-        contraction.
+        both is the tolerance to set. Both lengths are fitted to the paper's robot of rods under a timed wave, with
+        moduli of 0.3 to 2 GPa, friction of 0.05 to 1 and damping times of 0.05 to 0.36 s, within 7 and 4 mm, with
+        muscles that lag behind their commands by the engine's times. Under the paper's network the worm walks with
+        three quarters of the lift and more (docs/robust.md). The stiffness enters as ``sqrt(EI / (k s^3))``, with the
+        springs' rate k and the side s of a rhombus: stiffer strands spread a contraction.
 
         Args:
             friction: Coefficient of the ground.
 
         Returns:
-            How far neighbours lift a segment, and the length beyond rest at which the releasing and the next segment
-            are equally long; where the first is the larger, no tolerance is known to do. None for bodies that were not
-            measured: other than rods with rigid crossings, with a damping time of 0.05 to 0.4 s, muscles all round,
-            springs that are at rest as drawn, and segments that are alike.
+            `WALKS_FROM` of how far neighbours lift a segment, and the length beyond rest at which the releasing and the
+            next segment are equally long; where the first is the larger, no tolerance is known to do. None for bodies
+            that were not measured: other than rods with rigid crossings, with a damping time of 0.05 to 0.4 s, muscles
+            all round that lag, springs that are at rest as drawn, and segments that are alike.
         """
         if len(self.groups()) > 1 or self.relative_friction is not None:
             return None
         damping_s, rings, rate = self.strands.damping_time_s, self.rings, self.springs.one_number("stiffness_N_per_m")
-        measured = self.has_rigid_crossings and rings.muscle is not None and not self.has_halves
+        lagging = rings.model_dump().get("activation_dynamics", False)
+        measured = self.has_rigid_crossings and rings.muscle is not None and lagging and not self.has_halves
         # Beyond what was measured the lines that were fitted say nothing.
         if not measured or self.springs.rest_length_m is not None or not rate or not 0.05 <= damping_s <= 0.4:
             return None
@@ -122,9 +124,8 @@ class WormBody(MeshBody):
         spread = sqrt(self.strands.bending_rigidity_Nm2 / (rate * shape.side_m**3))
         slippery = log(1.0 / min(max(friction, 0.05), 1.0))
         most = shape.longest_m - shape.along_m
-        # Strands of less damping swing, which lifts neighbours as much.
-        lift = max(0.02, spread * (0.1242 + 0.9613 * max(damping_s, 0.145)) + 0.0401 * slippery - 0.0913)
-        return most * lift, most * (0.1581 + 0.0586 * spread + 0.5945 * damping_s)
+        lift = 0.388 * spread + 0.951 * damping_s + 0.008 * slippery - 0.179
+        return most * max(0.02, WALKS_FROM * lift), most * 0.554
 
     def groups(self) -> list[tuple[list[int], Self]]:
         """Groups the segments whose mesh, strands, pins and springs are alike.

@@ -84,7 +84,6 @@ STALE: tuple[str, ...] = (
     "robustness_three_segments.json",
     "slip.csv",
     "tune_timed.csv",
-    "uncertainty_turns.csv",
     "weak_middle.csv",
 )
 """Result files whose worms have changed since: to be measured again."""

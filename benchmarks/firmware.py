@@ -34,7 +34,7 @@ from annelid.nervous import (
 from annelid.output import write_csv
 from annelid.protocols import Controller, Sensation
 from annelid_lab.firmware import Firmware, HostFirmware, controller_firmware, network_firmware
-from annelid_studies.worms import PAPERS_RODS
+from annelid_studies.standard_cases import PAPERS_RODS
 
 ARM = Path(__file__).parent / "arm"
 CORES = {

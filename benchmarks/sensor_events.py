@@ -27,7 +27,7 @@ from annelid.experiment.case import SHEAR_OVER_YOUNG
 from annelid.output import write_csv
 from annelid.plausibility import tolerance_window_m
 from annelid_studies.robustness import TIMED
-from annelid_studies.worms import PAPERS_RODS
+from annelid_studies.standard_cases import PAPERS_RODS
 
 
 def strands(modulus_GPa: float) -> dict[str, Any]:

@@ -28,7 +28,7 @@ from annelid.config import (
     preset_text,
 )
 from annelid.errors import ConfigError
-from annelid.experiment.space import variables_of
+from annelid.experiment.search_space import variables_of
 from annelid_studies.planar.sections import PlanarWorm
 
 

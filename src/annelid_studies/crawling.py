@@ -20,8 +20,8 @@ from annelid.errors import ConfigError
 from annelid.experiment import Case, Judged, Store, finer_steps, judge, more_elements
 from annelid.markdown import Table
 from annelid.output import write_csv
+from annelid_studies.standard_cases import Effort, drawn_frictions
 from annelid_studies.tables import Results, terminal_table
-from annelid_studies.worms import Effort, drawn_frictions
 
 GAITS = ("riddle2025-muscles", "crawler")
 """The untuned gait and the one tuned for speed."""

@@ -16,8 +16,8 @@ from annelid.draw import canvas, draw_lines, line_looks, panel_title, save_both
 from annelid.experiment import Case, Store
 from annelid.morphology import Array
 from annelid.simulation import Run
+from annelid_studies.standard_cases import Effort
 from annelid_studies.tables import Results, fields_table, grouped, write_fields
-from annelid_studies.worms import Effort
 
 PRESET = "riddle2025-muscles"
 CM = 100.0

@@ -21,8 +21,8 @@ from annelid.draw import canvas, line_looks, panel_title, save_both
 from annelid.experiment import Case, Store
 from annelid.morphology import Array
 from annelid.simulation import Run
+from annelid_studies.standard_cases import Effort
 from annelid_studies.tables import Results, fields_table, grouped, write_fields
-from annelid_studies.worms import Effort
 
 CM = 100.0
 Ground = Literal["flat", "straight pipe", "bend"]

@@ -26,8 +26,8 @@ from annelid.experiment import SHEAR_OVER_YOUNG, Case, Store, StudyProgress
 from annelid.markdown import Table, plain_table
 from annelid.output import write_text
 from annelid.simulation import locks
+from annelid_studies.standard_cases import PAPERS_RODS, RODS
 from annelid_studies.tables import grouped
-from annelid_studies.worms import PAPERS_RODS, RODS
 
 CONTROLLERS = ("sns", "sns-tolerance", "sns-robust", "timed")
 """The paper's with the preset's tolerance, and with the tolerance that the body needs; ours; a wave without sensing."""

@@ -24,8 +24,8 @@ from annelid.markdown import Table
 from annelid.output import write_csv
 from annelid.simulation import Run
 from annelid_studies.slip_detector import Detection, DetectionScore, detect_slip, precision_recall, score_detections
+from annelid_studies.standard_cases import Effort, drawn_frictions
 from annelid_studies.tables import Results, terminal_table
-from annelid_studies.worms import Effort, drawn_frictions
 
 PRESET = "riddle2025-muscles"
 TUNED_AT = 0.7

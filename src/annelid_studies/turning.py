@@ -14,8 +14,8 @@ from annelid.analysis import Track, track_of
 from annelid.draw import canvas, draw_lines, line_looks, panel_title, save_both
 from annelid.errors import RunFileError
 from annelid.experiment import Case, Store
+from annelid_studies.standard_cases import Effort
 from annelid_studies.tables import Results, fields_table, grouped, write_fields
-from annelid_studies.worms import Effort
 
 COUNTER = (1.0, 1.0, -1.0, -1.0, 1.0, 1.0)
 """Shares of six segments: the ends bend to one side, the middle to the other."""

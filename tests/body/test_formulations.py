@@ -18,7 +18,7 @@ from annelid.config import RunConfig, load_config
 from annelid.errors import ConfigError
 from annelid.morphology import MeshGeometry, helical_mesh
 from annelid.simulation.worm import WormPlant
-from annelid_studies.worms import TIGHT_CHAIN
+from annelid_studies.standard_cases import TIGHT_CHAIN
 
 RODS = {"kind": "rods"}
 SOFT_CHAIN = {"kind": "chain"}

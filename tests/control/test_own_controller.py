@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from annelid.config import check_config
-from annelid.control.own import VARIABLE, own_controller
+from annelid.control.user_controller import VARIABLE, own_controller
 from annelid.errors import ConfigError
 from annelid.experiment import Case, Store, case_key, fingerprint
 from annelid.experiment.executors import Processes

@@ -49,7 +49,7 @@ def test_gymnasium_makes_many_by_name() -> None:
     envs = gymnasium.make_vec("annelid/Worm-v0", num_envs=2, vectorization_mode="sync", **CHEAP)
     observations, _ = envs.reset(seed=0)
     assert observations.shape == envs.observation_space.shape
-    layout, *_ = envs.get_attr("layout")
+    layout, *_ = envs.get_attr("layout")  # pyright: ignore[reportAttributeAccessIssue]
     assert layout.named(observations)["touch"].shape == (2, 3, 4)
     assert envs.step(envs.action_space.sample())[0] in envs.observation_space
     envs.close()

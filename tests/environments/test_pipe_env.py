@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from worms import CHEAP
 
-from annelid.arena.course import AHEAD, LEFT, UP
+from annelid.arena.centre_line import AHEAD, LEFT, UP
 from annelid.arena.kinds.floor import Floor
 from annelid.arena.kinds.pipe import Pipe
 from annelid.environments import WormEnv

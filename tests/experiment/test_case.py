@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from annelid.config import RunConfig, load_config, parse_assignments
 from annelid.experiment.case import Case
-from annelid_studies.worms import CHAIN, PLANAR, RODS, chain, fast, rods
+from annelid_studies.standard_cases import CHAIN, PLANAR, RODS, chain, fast, rods
 
 
 def typed(command: str) -> RunConfig:

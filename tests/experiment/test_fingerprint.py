@@ -15,7 +15,7 @@ from annelid.experiment import fingerprint
 from annelid.experiment.case import Case
 from annelid.experiment.fingerprint import PHYSICS, READERS, code_fingerprint, room_of, run_key
 from annelid_lab.calibration.base import Experiment
-from annelid_studies.worms import PLANAR, RODS
+from annelid_studies.standard_cases import PLANAR, RODS
 
 SOURCE = Path(annelid.__file__).parent.parent
 NO_RESULT = ("annelid.lazy", "annelid.markdown", "annelid.terminal", "annelid.experiment.fingerprint")

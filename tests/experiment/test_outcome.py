@@ -9,7 +9,7 @@ from annelid.experiment.case import Case
 from annelid.experiment.outcome import outcome, read_outcome, write_outcome
 from annelid.simulation.loop import simulate
 from annelid.simulation.runfile import Run
-from annelid_studies.worms import FAST, RODS, one_after_the_other
+from annelid_studies.standard_cases import FAST, RODS, one_after_the_other
 
 HOLD_S, REST_S = 0.3, 0.2
 PROGRAM = one_after_the_other(hold_s=HOLD_S, rest_s=REST_S)

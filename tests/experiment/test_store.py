@@ -21,7 +21,7 @@ from annelid.experiment.executors import Processes
 from annelid.experiment.outcome import OUTCOME_NAME, Outcome
 from annelid.experiment.store import DRAFTS, Store, attempt, case_key, compute_run, keep_outcome, new_draft
 from annelid.simulation.runfile import FILE_NAME, open_run
-from annelid_studies.worms import PLANAR, RODS
+from annelid_studies.standard_cases import PLANAR, RODS
 
 
 def planar(seed: int = 0, duration_s: float = 0.1) -> Case:

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 import annelid
 from annelid.config import Study, load_study
 from annelid.errors import ConfigError
-from annelid.experiment.space import spread_evenly, unit_samples
+from annelid.experiment.search_space import spread_evenly, unit_samples
 from annelid.experiment.sweep import (
     Plan,
     Sweep,

@@ -20,7 +20,7 @@ from annelid.experiment import store as runs
 from annelid.experiment.case import Case
 from annelid.experiment.gait_criteria import Judged, judge
 from annelid.experiment.outcome import Outcome
-from annelid.experiment.space import Choice, Interval, from_unit
+from annelid.experiment.search_space import Choice, Interval, from_unit
 from annelid.experiment.store import Store, case_key
 from annelid.experiment.tune import (
     OBJECTIVES,

@@ -19,8 +19,18 @@ import annelid
 from annelid.config import field_value, load_config
 from annelid.errors import ConfigError, SimulationStopped
 from annelid.experiment.case import Case
+from annelid.experiment.finer_runs import finer_steps, more_elements
 from annelid.experiment.outcome import outcome
-from annelid.experiment.spread import ABSENT, CALIBRATION, EXACT, FIELDS, UNMEASURED, applicable, changes, draw
+from annelid.experiment.parameter_errors import (
+    ABSENT,
+    CALIBRATION,
+    EXACT,
+    FIELDS,
+    UNMEASURED,
+    applicable,
+    changes,
+    draw,
+)
 from annelid.experiment.uncertainty import (
     Quantity,
     Spread,
@@ -33,9 +43,8 @@ from annelid.experiment.uncertainty import (
     uncertainty_table,
     write_uncertainty,
 )
-from annelid.experiment.variants import finer_steps, more_elements
 from annelid.simulation.runfile import open_run
-from annelid_studies.worms import RODS
+from annelid_studies.standard_cases import RODS
 from outcome import Command
 
 pytestmark = pytest.mark.usefixtures("runs_in_this_process")

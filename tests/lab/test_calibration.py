@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from annelid.body.worm import WormBody
 from annelid.config import RunConfig, load_config
 from annelid.errors import AnnelidError, ConfigError
-from annelid.experiment.spread import read_spread
+from annelid.experiment.parameter_errors import read_spread
 from annelid_lab.calibration.base import Data
 from annelid_lab.calibration.intervals import confused
 from annelid_lab.calibration.kinds.load_frame import FrameTest

@@ -18,7 +18,7 @@ from annelid.config import RunConfig, load_config
 from annelid.errors import AnnelidError, ConfigError
 from annelid.plausibility import check, tolerance_window_m
 from annelid.simulation.loop import simulate
-from annelid_lab.similar import BASE, LARGEST_ANGLE_RAD, similar_worm, worm_text
+from annelid_lab.scaled_worm import BASE, LARGEST_ANGLE_RAD, similar_worm, worm_text
 
 RADII_M, SEGMENTS, HELICES = (0.02, 0.4), (3, 20), (6, 8, 10, 12, 14, 16)
 

@@ -21,7 +21,7 @@ from annelid.experiment.executors import scheduler
 from annelid.experiment.outcome import OUTCOME_NAME
 from annelid.experiment.store import Store, attempt, case_key
 from annelid.simulation.runfile import FILE_NAME
-from annelid_studies.worms import PLANAR
+from annelid_studies.standard_cases import PLANAR
 
 STUDY = """
 preset = "riddle2022-planar"

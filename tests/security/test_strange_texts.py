@@ -13,7 +13,7 @@ import pytest
 from annelid import Network, simulate
 from annelid.config import load_config, load_study
 from annelid.errors import AnnelidError
-from annelid.experiment.spread import read_spread
+from annelid.experiment.parameter_errors import read_spread
 from annelid.nervous import Gate, Neuron, Synapse
 from annelid.simulation import Run
 from annelid.textfiles import MOST_BYTES, parse_toml

@@ -10,7 +10,7 @@ import pytest
 from annelid.config import RunConfig, load_config
 from annelid.errors import ConfigError
 from annelid.protocols import Stateful
-from annelid.simulation.adjust import adjusted
+from annelid.simulation.changed_while_running import adjusted
 from annelid.simulation.stepping import Simulation, build_controller, build_plant, start
 from annelid.simulation.worm import WormPlant
 

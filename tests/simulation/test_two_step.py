@@ -13,7 +13,7 @@ import pytest
 from annelid.body.formulations.rods.two_step import TwoStep
 from annelid.config import load_config
 from annelid.errors import SimulationStopped
-from annelid.simulation.adjust import adjusted
+from annelid.simulation.changed_while_running import adjusted
 from annelid.simulation.stepping import build_controller, start
 from annelid.simulation.worm import WormPlant
 

@@ -14,7 +14,7 @@ from annelid import load_config, open_run, simulate, summary
 from annelid.body.worm import WormBody
 from annelid.config import RunConfig
 from annelid.errors import ConfigError, SimulationStopped
-from annelid.simulation.watch import Energies, Watch
+from annelid.simulation.guards import Energies, Watch
 
 NO_ENERGY = Energies(0.0, 0.0)
 HARD = {

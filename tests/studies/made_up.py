@@ -10,8 +10,8 @@ from annelid.analysis import RhythmScore
 from annelid.experiment.case import Case
 from annelid.experiment.outcome import Hold, Outcome
 from annelid.experiment.store import Store, case_key
-from annelid_studies.riddle2023.contents import Examination
-from annelid_studies.worms import Effort
+from annelid_studies.riddle2023.report_parts import Examination
+from annelid_studies.standard_cases import Effort
 
 WAVE = RhythmScore("ordered", "a wave", (1, 2, 3, 1, 2, 3), 2.63, 0.01, 1.0, 1, 1, 1.0, 4.2)
 SILENT = replace(WAVE, verdict="silent", direction=0, wave_fronts=None, period_s=None, last_onset_s=0.7)

@@ -31,7 +31,7 @@ from annelid_studies.bench.timing import (
     laps_s,
     shares,
 )
-from annelid_studies.worms import CHAIN, RODS
+from annelid_studies.standard_cases import CHAIN, RODS
 
 positive = st.floats(1e-3, 1e3)
 

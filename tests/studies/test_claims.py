@@ -15,10 +15,10 @@ from annelid.experiment.store import case_key
 from annelid.simulation.runfile import Run
 from annelid_studies.riddle2023.claims import Evidence, judge
 from annelid_studies.riddle2023.claims.evidence import JUDGES, judged, near
-from annelid_studies.riddle2023.contents import Examination, Findings, Table
 from annelid_studies.riddle2023.examinations import EXAMINATIONS
+from annelid_studies.riddle2023.report_parts import Examination, Findings, Table
 from annelid_studies.riddle2023.words import filled, texts
-from annelid_studies.worms import FAST, Effort
+from annelid_studies.standard_cases import FAST, Effort
 
 SIX_SPRINGS = (0.392, 0.302, 0.284, 0.334, 0.285, 0.322)
 """How far segment 2 stays below segment 1 by each of the springs; the paper says 39.4 %."""

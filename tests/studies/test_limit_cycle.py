@@ -13,6 +13,7 @@ from annelid.config import RunConfig, load_config
 from annelid.errors import ConfigError
 from annelid.protocols import Array, Sensation, State
 from annelid.simulation import build_controller, build_plant
+from annelid_studies.limit_cycle.closed_loop import ClosedLoop, Continuous, travel
 from annelid_studies.limit_cycle.cycle import (
     LimitCycle,
     NoLimitCycle,
@@ -22,7 +23,6 @@ from annelid_studies.limit_cycle.cycle import (
     section_at,
     settle,
 )
-from annelid_studies.limit_cycle.flow import ClosedLoop, Continuous, travel
 from annelid_studies.planar import Riddle2022Plant
 
 

@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 
 from annelid.experiment.progress import LINE_EVERY_S, Lines, TimeLeft, study_progress
-from annelid_studies.riddle2023.contents import Claim, Report, Table
-from annelid_studies.worms import Effort
+from annelid_studies.riddle2023.report_parts import Claim, Report, Table
+from annelid_studies.standard_cases import Effort
 from outcome import Command
 
 CLAIM = Claim("results", "It walks", "Sect. 4", "2.635 s", "2.629 s", "It does.", "annelid run riddle2023", "holds")

@@ -14,8 +14,17 @@ from annelid.draw.canvas import canvas, save_both
 from annelid.errors import RunFileError
 from annelid.markdown import anchors, cell, code, words
 from annelid.text import printable
-from annelid_studies.riddle2023.contents import Claim, Examination, Examined, Figure, Findings, Report, Table, Verdict
 from annelid_studies.riddle2023.report import CLAIMS_COMMAND, claims_page, write_report
+from annelid_studies.riddle2023.report_parts import (
+    Claim,
+    Examination,
+    Examined,
+    Figure,
+    Findings,
+    Report,
+    Table,
+    Verdict,
+)
 
 COMMAND = """annelid run riddle2023 --set 'controller={kind = "program", ramp_s = 0.1}' --set arena.friction=0.3"""
 SPECIAL = "1 * 2 * 3 _a_ b_c `code|bar` <b>bold</b> |x| < 3 & [4](http://x) #5 ~6~ $7$ \\8 &lt; !"

@@ -15,9 +15,9 @@ from annelid.config import load_config, preset_names
 from annelid.draw.scene import Skeleton
 from annelid.errors import ConfigError, RunFileError
 from annelid.live.history import History, Moment, history_of
+from annelid.live.lines_and_arrows import Painter, painter_of
 from annelid.live.live_worm import LiveWorm, knobs_of
 from annelid.live.panel import MOST_SAMPLES, plots_of
-from annelid.live.picture import Painter, painter_of
 from annelid.live.player import Player, player_of
 from annelid.live.scene_geoms import triangles
 from annelid.simulation.runfile import Run
@@ -241,8 +241,8 @@ def test_a_run_is_read_as_it_was_recorded(rods_run: Run) -> None:
 
 
 def test_the_ground_is_there_and_a_ray_is_turned_into_the_axes_of_a_slope() -> None:
+    from annelid.live.scene_nodes import LAYERS, Stage
     from annelid.live.server import Server
-    from annelid.live.stage import LAYERS, Stage
 
     posts: dict[str, Any] = {"arena.posts": [[-0.4, 0.1, 0.1]], "arena.slope_deg": 30.0}
     for arena, overrides, nodes in (

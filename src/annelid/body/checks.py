@@ -108,7 +108,7 @@ def tolerance_findings(config: RunConfig, body: MeshBody, window: tuple[float, f
     shape, tolerance = rhombus_of(body), config.sensor.tolerance_m
     most = shape.longest_m - shape.along_m
     # Muscles that lag let segments pass each other at more than half of that (docs/robust.md).
-    share = 0.5 if body.rings.model_dump().get("activation_dynamics", False) else 0.25
+    share = 0.5 if body.model_dump().get("rings", {}).get("activation_dynamics", False) else 0.25
     low, high = window or (0.02 * most, share * most)
     instead = f"set about {(low + high) / 2 if window else 0.48 * high:.2g}"
     if tolerance >= most:

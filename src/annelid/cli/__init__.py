@@ -97,6 +97,6 @@ __all__ = [
 ]
 
 # The help lists commands in this order.
-for _home in ("run", "check", "see", "vary", "lists"):
+for _home in ("run", "check", "see", "sweep_and_tune", "lists"):
     load_home(f"annelid.cli.{_home}")
 load_extensions(COMMANDS)

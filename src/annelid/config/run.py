@@ -25,7 +25,7 @@ from annelid.textfiles import parse_toml
 if TYPE_CHECKING:
     import mujoco
 
-    from annelid.arena.course import Bore, Course
+    from annelid.arena.centre_line import Bore, Course
     from annelid.arena.surface import Shape, Surface
     from annelid.morphology import MeshGeometry
     from annelid.protocols import Array, Controller, Plant, Sensation, Values

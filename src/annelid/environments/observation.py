@@ -11,7 +11,7 @@ import numpy as np
 from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 
-from annelid.arena.course import AHEAD, LEFT, UP
+from annelid.arena.centre_line import AHEAD, LEFT, UP
 from annelid.config import ArenaKind
 from annelid.markdown import table
 from annelid.morphology import Array, heading_turn

@@ -20,12 +20,12 @@ if TYPE_CHECKING:
     from annelid.experiment.case import SHEAR_OVER_YOUNG, Case, write_worm
     from annelid.experiment.check import Check, check, compare, refinements
     from annelid.experiment.executors import Processes, answers, end_after
+    from annelid.experiment.finer_runs import finer_steps, more_elements
     from annelid.experiment.fingerprint import code_fingerprint, physics_fingerprint, room_of
     from annelid.experiment.gait_criteria import Judged, judge, numerical_problem
     from annelid.experiment.outcome import Hold, Outcome
     from annelid.experiment.progress import StudyProgress, study_progress
     from annelid.experiment.store import Store, case_key
-    from annelid.experiment.variants import finer_steps, more_elements
 
 __all__ = [
     "SHEAR_OVER_YOUNG",

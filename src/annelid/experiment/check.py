@@ -15,10 +15,10 @@ from annelid.analysis import NUMBERS
 from annelid.config import RunConfig
 from annelid.errors import ConfigError, listed
 from annelid.experiment.case import Case
+from annelid.experiment.finer_runs import STEP, finer_steps, more_elements, run_with_variants
 from annelid.experiment.outcome import Outcome
 from annelid.experiment.progress import StudyProgress
 from annelid.experiment.store import Done, Store
-from annelid.experiment.variants import STEP, finer_steps, more_elements, run_with_variants
 from annelid.output import write_json
 from annelid.simulation.lock import locks
 from annelid.simulation.runfile import Run, open_run

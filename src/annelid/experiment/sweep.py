@@ -30,7 +30,15 @@ from annelid.experiment.case import Case
 from annelid.experiment.check import Check, check_runs, refinements
 from annelid.experiment.executors import workers
 from annelid.experiment.progress import StudyProgress
-from annelid.experiment.space import Choice, Variable, from_unit, sampled, spread_evenly, unit_samples, variables_of
+from annelid.experiment.search_space import (
+    Choice,
+    Variable,
+    from_unit,
+    sampled,
+    spread_evenly,
+    unit_samples,
+    variables_of,
+)
 from annelid.experiment.store import Done, Store
 from annelid.output import whole_file, write_csv
 from annelid.protocols import Array

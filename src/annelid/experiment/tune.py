@@ -24,7 +24,7 @@ from annelid.draw.figures.sweep import worded
 from annelid.errors import ConfigError, MissingDependency, suggest
 from annelid.experiment.case import Case, write_worm
 from annelid.experiment.gait_criteria import Judged, judge
-from annelid.experiment.space import Choice, Variable, spread_evenly, variables_of
+from annelid.experiment.search_space import Choice, Variable, spread_evenly, variables_of
 from annelid.experiment.store import Done, Store
 from annelid.output import write_csv
 

@@ -22,11 +22,19 @@ from annelid.config import RunConfig
 from annelid.draw.figures.experiments import uncertainty_figure
 from annelid.draw.summary_table import framed_table
 from annelid.errors import ConfigError
+from annelid.experiment.finer_runs import STEP, finer_steps, more_elements, run_with_variants
 from annelid.experiment.outcome import Outcome
+from annelid.experiment.parameter_errors import (
+    UNMEASURED,
+    Spread,
+    applicable,
+    changes,
+    draw,
+    read_spread,
+    scaled_fields,
+)
 from annelid.experiment.progress import StudyProgress
-from annelid.experiment.spread import UNMEASURED, Spread, applicable, changes, draw, read_spread, scaled_fields
 from annelid.experiment.store import Done
-from annelid.experiment.variants import STEP, finer_steps, more_elements, run_with_variants
 from annelid.output import write_csv, write_json
 from annelid.simulation.lock import locks
 

@@ -13,7 +13,7 @@ from annelid.config.kinds import above
 from annelid.live.history import History, Moment, signal_names
 from annelid.morphology import Array
 from annelid.protocols import Plant, Records
-from annelid.simulation.adjust import adjusted
+from annelid.simulation.changed_while_running import adjusted
 from annelid.simulation.stepping import Simulation, build_controller, build_plant, start
 from annelid.simulation.worm import WormPlant
 

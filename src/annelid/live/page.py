@@ -9,11 +9,11 @@ from pathlib import Path
 from annelid.config import RunConfig
 from annelid.draw.render import Progress
 from annelid.errors import RunFileError
+from annelid.live.lines_and_arrows import painter_of
 from annelid.live.panel import legend_html
-from annelid.live.picture import painter_of
 from annelid.live.player import player_of
+from annelid.live.scene_nodes import Stage
 from annelid.live.server import Server, content_policy, with_extras
-from annelid.live.stage import Stage
 from annelid.output import whole_file, with_suffix
 from annelid.simulation.runfile import Run
 

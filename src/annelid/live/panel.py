@@ -12,12 +12,12 @@ import numpy as np
 from annelid.config import Knob, RunConfig
 from annelid.draw.canvas import CONTRACTED, RELAXED, segment_colors
 from annelid.draw.figures.network_diagram import by_segment, network_of, role_of
+from annelid.live.lines_and_arrows import CONTACT_COLOR, SPRING_COLORS, SPRING_RANGE, STRAND_COLORS
 from annelid.live.live_worm import LiveWorm, knobs_of
 from annelid.live.network import colors_html, network_html
-from annelid.live.picture import CONTACT_COLOR, SPRING_COLORS, SPRING_RANGE, STRAND_COLORS
 from annelid.live.player import FASTEST, SLOWEST, Player
 from annelid.live.requests import Requests
-from annelid.live.stage import LAYERS, Stage
+from annelid.live.scene_nodes import LAYERS, Stage
 from annelid.morphology import Array
 
 if TYPE_CHECKING:

@@ -13,12 +13,12 @@ import numpy as np
 from annelid.config import RunConfig
 from annelid.errors import AnnelidError
 from annelid.live.history import Moment
+from annelid.live.lines_and_arrows import hit_point, painter_of
 from annelid.live.panel import Panel, Plot, legend_html, status_html
-from annelid.live.picture import hit_point, painter_of
 from annelid.live.player import player_of
 from annelid.live.requests import Requests
+from annelid.live.scene_nodes import Stage
 from annelid.live.server import LOOPBACK, Server
-from annelid.live.stage import Stage
 from annelid.simulation.runfile import Run
 
 if TYPE_CHECKING:

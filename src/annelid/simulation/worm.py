@@ -25,9 +25,9 @@ from annelid.protocols import SIDES, Recordable, Sensation, Signal, State, Value
 from annelid.simulation.anatomy import Anatomy, Posture, add_contact_sensors, start_placement
 from annelid.simulation.energies import EnergyTotals, Powers, work_in_step
 from annelid.simulation.ground import MovingGround
+from annelid.simulation.guards import Energies, Watch
 from annelid.simulation.scene_objects import NO_ENCOUNTER
 from annelid.simulation.skin import Touch
-from annelid.simulation.watch import Energies, Watch
 
 STATE_PARTS = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 """All that the engine's next step depends on: positions, velocities, activations, warm start."""

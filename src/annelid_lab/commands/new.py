@@ -36,7 +36,7 @@ def new_command(
     annelid run mine.toml
     """
     from annelid.output import write_text
-    from annelid_lab.similar import worm_text
+    from annelid_lab.scaled_worm import worm_text
 
     if path.suffix != ".toml":
         raise typer.BadParameter(f"{path} must end in .toml")

@@ -22,7 +22,7 @@ from annelid.simulation import locks
 from annelid.textfiles import parse_toml, read_json
 from annelid_studies.bench.cases import BenchCase, as_it_is, bench_cases, converged
 from annelid_studies.bench.measure import measure_alone
-from annelid_studies.worms import CHAIN, RODS, Effort
+from annelid_studies.standard_cases import CHAIN, RODS, Effort
 
 JSON_NAME = "bench.json"
 CASES_FOLDER = "cases"

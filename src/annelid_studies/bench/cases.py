@@ -11,7 +11,7 @@ from annelid.body import WormBody, worm_of
 from annelid.config import LEVELS, RunConfig, load_config
 from annelid.errors import ConfigError, suggest
 from annelid.experiment import Case
-from annelid_studies.worms import CHAIN, FAST, RODS, Effort, drawn_frictions
+from annelid_studies.standard_cases import CHAIN, FAST, RODS, Effort, drawn_frictions
 
 LINES = {
     "levels": "the levels of --fidelity, riddle2025-muscles and riddle2023-fast, beside the paper's formulation",

@@ -16,8 +16,8 @@ from annelid.draw import canvas, panel_title, save_both, segment_colors
 from annelid.markdown import Table
 from annelid_studies.bench.benchmark import QUANTITIES
 from annelid_studies.bench.cases import CONVERGED_ELEMENTS, CONVERGED_STEP_S
+from annelid_studies.standard_cases import CHAIN, RODS
 from annelid_studies.tables import terminal_table
-from annelid_studies.worms import CHAIN, RODS
 
 TOLERATED_PERCENT = 2.0
 """The line in the first panels: the error that a default may have."""

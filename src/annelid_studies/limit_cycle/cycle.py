@@ -3,7 +3,7 @@
 The return map of a section is iterated until the orbit closes; state-transition
 matrices along it give the Floquet multipliers and the phase response (Seydel 2010, ch. 7; Ermentrout & Terman 2010,
 ch. 8). Steps of finite length are not a flow: their trivial multiplier is not 1, and kinks within a step take it
-further away; `Continuous` of `annelid_studies.limit_cycle.flow` takes care of both.
+further away; `Continuous` of `annelid_studies.limit_cycle.closed_loop` takes care of both.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from annelid.control import paper_controller
 from annelid.errors import AnnelidError, ConfigError, suggest
 from annelid.protocols import Array, Controller, Plant, Stateful
 from annelid.simulation import build_controller, build_plant
-from annelid_studies.limit_cycle.flow import (
+from annelid_studies.limit_cycle.closed_loop import (
     ClosedLoop,
     Continuous,
     Copies,

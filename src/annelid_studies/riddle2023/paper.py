@@ -19,12 +19,12 @@ from annelid.simulation import Run, locks
 from annelid_studies.riddle2023 import words
 from annelid_studies.riddle2023.claims import Evidence, claim_cases, paper_claims, rule
 from annelid_studies.riddle2023.claims.evidence import order_of, readings_m
-from annelid_studies.riddle2023.contents import Claim, Examined, Figure, Report
 from annelid_studies.riddle2023.examinations import EXAMINATIONS
 from annelid_studies.riddle2023.examinations.design import walked_elongation
 from annelid_studies.riddle2023.figures import muscle_surface, propagation, renderings, robot_lengths
+from annelid_studies.riddle2023.report_parts import Claim, Examined, Figure, Report
 from annelid_studies.riddle2023.words import CM, MM, PERCENT, caption, texts
-from annelid_studies.worms import CHAIN, FAST, RODS, RODS_STEP_S, Effort, rods
+from annelid_studies.standard_cases import CHAIN, FAST, RODS, RODS_STEP_S, Effort, rods
 
 MAIN = Case(CHAIN)
 VARIANTS = {

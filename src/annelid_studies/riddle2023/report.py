@@ -10,7 +10,7 @@ from urllib.parse import quote
 from annelid.draw import html_page
 from annelid.markdown import anchors, code, emphasis, plain_table, strong, table, words
 from annelid.output import write_text
-from annelid_studies.riddle2023.contents import Claim, Examined, Figure, Report, tally
+from annelid_studies.riddle2023.report_parts import Claim, Examined, Figure, Report, tally
 from annelid_studies.riddle2023.words import capitalised
 from annelid_studies.tables import grouped
 

@@ -14,7 +14,7 @@ from annelid.config import load_config
 from annelid.errors import ConfigError
 from annelid.experiment import Case, Hold, Outcome, Store
 from annelid_studies.riddle2023.figures.muscle_surface import scaled_length
-from annelid_studies.worms import RODS
+from annelid_studies.standard_cases import RODS
 
 PRESET = "riddle2025"
 BASE_WORM: dict[str, Any] = {

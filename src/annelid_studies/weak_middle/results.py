@@ -16,6 +16,7 @@ from annelid.draw import canvas, panel_title, save_both, segment_colors
 from annelid.experiment import Store
 from annelid.markdown import Table
 from annelid.output import write_csv
+from annelid_studies.standard_cases import Effort
 from annelid_studies.tables import Results, tabulated, terminal_table
 from annelid_studies.weak_middle.pulls import ACTUATORS
 from annelid_studies.weak_middle.sweeps import (
@@ -33,7 +34,6 @@ from annelid_studies.weak_middle.sweeps import (
     deficits,
     weak_middle,
 )
-from annelid_studies.worms import Effort
 
 ROBOT_DEFICIT, PAPERS_DEFICIT = interior_deficit(ROBOT_ELONGATION_M), interior_deficit(PAPER_ELONGATION_M)
 """How far the interior segments of the robot and of the paper's simulation stay below the ends, fractions."""

@@ -17,6 +17,7 @@ from annelid.analysis import ROBOT_ELONGATION_M, interior_deficit
 from annelid.errors import ConfigError
 from annelid.experiment import Case, Store
 from annelid.morphology import Array
+from annelid_studies.standard_cases import Effort
 from annelid_studies.tables import grouped
 from annelid_studies.weak_middle.pulls import (
     GUESSES_M,
@@ -30,7 +31,6 @@ from annelid_studies.weak_middle.pulls import (
     read_pull,
     settings,
 )
-from annelid_studies.worms import Effort
 
 
 class Quantity(NamedTuple):

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from annelid.arena.course import UP
+from annelid.arena.centre_line import UP
 from annelid.arena.surface import Plane, Surface
 from annelid.config.answers import Post, Walls
 from annelid.config.run import ArenaKind, RunConfig

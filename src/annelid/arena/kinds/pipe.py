@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from annelid.arena.course import AHEAD, UP, Bore, Course, Curve, Straight
+from annelid.arena.centre_line import AHEAD, UP, Bore, Course, Curve, Straight
 from annelid.arena.kinds.floor import refuse_heading
 from annelid.arena.surface import Implicit, Level, Shape, grid_faces, lengths
 from annelid.config.run import ArenaKind, RunConfig

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import AfterValidator, Field
 
-from annelid.arena.course import UP
+from annelid.arena.centre_line import UP
 from annelid.arena.mjcf import SCENE, object_names, validator, with_contact
 from annelid.arena.mjcf_files import read_mjcf
 from annelid.arena.surface import Plane, Surface

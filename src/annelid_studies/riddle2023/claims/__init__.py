@@ -5,7 +5,7 @@ from annelid_studies.riddle2023.claims import future as future
 from annelid_studies.riddle2023.claims import model as model
 from annelid_studies.riddle2023.claims import results as results
 from annelid_studies.riddle2023.claims.evidence import Evidence, claim_cases, judge, rule
-from annelid_studies.riddle2023.contents import Claim
+from annelid_studies.riddle2023.report_parts import Claim
 from annelid_studies.riddle2023.words import texts
 
 __all__ = ["Evidence", "claim_cases", "judge", "paper_claims", "rule"]

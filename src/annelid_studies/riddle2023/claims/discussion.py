@@ -22,7 +22,7 @@ from annelid_studies.riddle2023.claims.evidence import (
 )
 from annelid_studies.riddle2023.examinations.friction import PAPERS_FRICTION, SLIPPERY
 from annelid_studies.riddle2023.figures.propagation import measure_propagation
-from annelid_studies.worms import chain, fast, one_after_the_other, rods
+from annelid_studies.standard_cases import chain, fast, one_after_the_other, rods
 
 SLIGHT_M = 0.001
 

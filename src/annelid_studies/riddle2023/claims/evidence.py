@@ -19,10 +19,10 @@ from annelid.experiment import Case, Outcome, Store
 from annelid.morphology import Array
 from annelid.simulation import Run
 from annelid_studies import slip
-from annelid_studies.riddle2023.contents import Claim, Findings, Verdict
 from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, SOFT, WORMS, Worm
+from annelid_studies.riddle2023.report_parts import Claim, Findings, Verdict
 from annelid_studies.riddle2023.words import filled, texts
-from annelid_studies.worms import CHAIN, FAST, PLANAR, Effort, chain, fast, one_after_the_other, rods
+from annelid_studies.standard_cases import CHAIN, FAST, PLANAR, Effort, chain, fast, one_after_the_other, rods
 
 MAIN = Case(CHAIN)
 EQUAL_RANGES = {"body.rings.length_range_m": [0.566, 1.067]}

@@ -31,7 +31,7 @@ from annelid_studies.riddle2023.examinations.design import WORMS
 from annelid_studies.riddle2023.examinations.discretization import HELD, QUANTITIES
 from annelid_studies.riddle2023.figures.muscle_surface import largest_difference
 from annelid_studies.riddle2023.words import span
-from annelid_studies.worms import fast, one_after_the_other, rods
+from annelid_studies.standard_cases import fast, one_after_the_other, rods
 
 PIN_RADIUS_M = 0.005
 

@@ -30,7 +30,7 @@ from annelid_studies.riddle2023.claims.evidence import (
     readings_m,
 )
 from annelid_studies.riddle2023.words import capitalised, in_unit, span
-from annelid_studies.worms import FAST
+from annelid_studies.standard_cases import FAST
 
 
 @judges

@@ -12,10 +12,10 @@ import numpy as np
 from annelid.analysis import RhythmScore, middle_deficit
 from annelid.experiment import Case, Hold, Outcome, Store
 from annelid.morphology import Array
-from annelid_studies.riddle2023.contents import Number
+from annelid_studies.riddle2023.report_parts import Number
 from annelid_studies.riddle2023.words import number
+from annelid_studies.standard_cases import chain, fast, rods
 from annelid_studies.tables import grouped
-from annelid_studies.worms import chain, fast, rods
 
 
 @dataclass(frozen=True)

@@ -11,11 +11,11 @@ from numpy.typing import ArrayLike
 from annelid.experiment import Store
 from annelid.morphology import Array
 from annelid_studies.riddle2023 import words
-from annelid_studies.riddle2023.contents import Findings, Number, examination, findings
 from annelid_studies.riddle2023.examinations import design
 from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, Columns, Point, Reading, Worm
+from annelid_studies.riddle2023.report_parts import Findings, Number, examination, findings
+from annelid_studies.standard_cases import Effort, one_after_the_other
 from annelid_studies.tables import tabulated
-from annelid_studies.worms import Effort, one_after_the_other
 
 PRESETS_ELEMENTS = 3
 """Elements a side in the presets, and in the paper."""

@@ -8,11 +8,11 @@ from typing import Any
 
 from annelid.experiment import Store
 from annelid_studies.riddle2023 import words
-from annelid_studies.riddle2023.contents import Findings, examination, findings
 from annelid_studies.riddle2023.examinations import design
 from annelid_studies.riddle2023.examinations.design import PAPERS, WORMS, Columns, Point, Worm
+from annelid_studies.riddle2023.report_parts import Findings, examination, findings
+from annelid_studies.standard_cases import Effort, one_after_the_other
 from annelid_studies.tables import tabulated
-from annelid_studies.worms import Effort, one_after_the_other
 
 FRICTIONS = (0.05, 0.1, 0.2, 0.4, 0.7, 1.0, 1.5)
 FEW = (0.05, 0.2, 0.4, 1.0, 1.5)

@@ -9,11 +9,11 @@ from typing import Any, NamedTuple
 from annelid.analysis import RhythmScore
 from annelid.experiment import Case, Store
 from annelid_studies.riddle2023 import words
-from annelid_studies.riddle2023.contents import Findings, Number, examination, findings
 from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, SOFT, Worm
+from annelid_studies.riddle2023.report_parts import Findings, Number, examination, findings
 from annelid_studies.riddle2023.words import MM
+from annelid_studies.standard_cases import CHAIN, Effort
 from annelid_studies.tables import tabulated
-from annelid_studies.worms import CHAIN, Effort
 
 Cells = Mapping[tuple[float, float], Sequence[RhythmScore]]
 """The runs of each (tolerance, noise), both in m."""

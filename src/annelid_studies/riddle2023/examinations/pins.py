@@ -11,12 +11,12 @@ from annelid.body import build_spec, worm_of
 from annelid.config import field_value
 from annelid.experiment import Case, Store
 from annelid_studies.riddle2023 import words
-from annelid_studies.riddle2023.contents import Findings, examination, findings
 from annelid_studies.riddle2023.examinations import design
 from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, SOFT, Columns, Point, Reading
 from annelid_studies.riddle2023.examinations.ranges import compiled_ranges
+from annelid_studies.riddle2023.report_parts import Findings, examination, findings
+from annelid_studies.standard_cases import TIGHT_CHAIN, Effort, chain, fast, one_after_the_other, rods
 from annelid_studies.tables import tabulated
-from annelid_studies.worms import TIGHT_CHAIN, Effort, chain, fast, one_after_the_other, rods
 
 STIFFNESSES_N_PER_M = (12.0, 26.0, 50.0, 100.0, 300.0, 1000.0)
 """Ties of the rods; 25.5 N/m are the preset's."""

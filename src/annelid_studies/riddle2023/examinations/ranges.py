@@ -10,11 +10,11 @@ from annelid.body import worm_of
 from annelid.experiment import Store
 from annelid.morphology import Array
 from annelid_studies.riddle2023 import words
-from annelid_studies.riddle2023.contents import Findings, examination, findings
 from annelid_studies.riddle2023.examinations import design
 from annelid_studies.riddle2023.examinations.design import PAPERS, WORMS, Point, Worm
+from annelid_studies.riddle2023.report_parts import Findings, examination, findings
+from annelid_studies.standard_cases import Effort, chain, one_after_the_other
 from annelid_studies.tables import tabulated
-from annelid_studies.worms import Effort, chain, one_after_the_other
 
 EQUAL = (0.566, 1.067)
 """Mean of the three ranges that the engine of the paper's time compiled, m."""

@@ -13,12 +13,12 @@ from annelid.experiment import Case, Outcome, Store
 from annelid.morphology import Array
 from annelid.simulation import open_run
 from annelid_studies.riddle2023 import words
-from annelid_studies.riddle2023.contents import Findings, Number, examination, findings
 from annelid_studies.riddle2023.examinations import design
 from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, SOFT, Columns, Point, Reading, Worm
+from annelid_studies.riddle2023.report_parts import Findings, Number, examination, findings
 from annelid_studies.riddle2023.words import MS
+from annelid_studies.standard_cases import Effort, one_after_the_other
 from annelid_studies.tables import tabulated
-from annelid_studies.worms import Effort, one_after_the_other
 
 TRANSIENT_S = 0.1
 """How much of a contraction's beginning is resolved, s."""

@@ -23,7 +23,7 @@ from annelid.draw.camera import FIELD_OF_VIEW_DEG, fitting_distance, picture_axe
 from annelid.draw.drawn_worm import upright
 from annelid.draw.scene import ROOM
 from annelid.live.history import Moment
-from annelid.live.picture import CONTACT_COLOR, Painter, PlanarPainter
+from annelid.live.lines_and_arrows import CONTACT_COLOR, Painter, PlanarPainter
 from annelid.live.scene_geoms import SceneGeoms
 from annelid.morphology import Array, heading_turn
 

@@ -12,7 +12,7 @@ from annelid.errors import suggest
 from annelid.experiment import Case, Store
 from annelid.markdown import Table
 from annelid_studies.riddle2023.words import filled, texts
-from annelid_studies.worms import Effort
+from annelid_studies.standard_cases import Effort
 
 Verdict = Literal["holds", "holds within", "rests on", "does not hold", "not testable here"]
 Number = float | str | None

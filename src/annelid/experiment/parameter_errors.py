@@ -19,7 +19,7 @@ from pydantic import BaseModel
 from annelid.body.actuators.servo import wrap_factors
 from annelid.config import RunConfig, field_value, fields_of
 from annelid.errors import ConfigError, UnreadableText, suggest
-from annelid.experiment.space import unit_samples
+from annelid.experiment.search_space import unit_samples
 from annelid.morphology import Array
 from annelid.textfiles import parse_json, read_text
 

@@ -178,7 +178,7 @@ def test_a_bad_section_is_refused_in_one_sentence(subtests: pytest.Subtests) -> 
         ({"kind": "adaptive", "network": {"tau": 3}}, r"unknown field 'controller\.network\.tau'"),
         ({"kind": "phase-chain", "rive": 3}, "did you mean 'drive'"),
         ({"kind": "timed", "rise_s": 0, "hold_s": 0, "fall_s": 0}, "would never contract"),
-        ({"kind": "sines"}, "must be one of 'sns', 'adaptive', 'phase-chain', 'program', 'shc', 'sine'"),
+        ({"kind": "sines"}, "must be one of 'sns', .*did you mean 'sine'"),
     ):
         with subtests.test(f"{controller!r:.60}"):
             with pytest.raises(ConfigError, match=sentence) as caught:

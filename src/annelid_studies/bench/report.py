@@ -126,7 +126,9 @@ def _error_axes(axes: Axes, quantity: str) -> None:
     upright = {"xycoords": axes.get_xaxis_transform(), "rotation": 90, "va": "top", "color": _FADED}
     axes.axvline(1.0, color=_FADED, linewidth=0.8, linestyle="-.", zorder=0)
     axes.annotate("real time", (1.0, 0.99), xytext=(2, 0), ha="left", **upright, **words)
-    axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    axes.set_xticks([0.3, 1.0, 3.0, 10.0], ["0.3", "1", "3", "10"])
+    axes.set_xticks([], minor=True)
+    axes.tick_params(labelbottom=True)
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     # Errors of one kind may lie within a decade.
     axes.yaxis.set_minor_formatter(lambda value, _: f"{value:g}" if f"{value:e}"[0] in "25" else "")
@@ -153,7 +155,7 @@ def _cost(part: SubFigure, entries: Sequence[Any], exponents: Mapping[str, Mappi
     axes.set_yscale("log")
     sizes = sorted({n for points in lines.values() for n in points})
     axes.set_xticks(sizes, [str(n) for n in sizes])
-    axes.minorticks_off()
+    axes.set_xticks([], minor=True)
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.set_xlabel("segments N (dotted: where a step takes as long as it simulates)")
     axes.set_ylabel("time of a step (ms)")

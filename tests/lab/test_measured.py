@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from annelid.config import load_config
@@ -74,6 +74,7 @@ def agreement_of(run: Run, log: pd.DataFrame, folder: Path, **fields: object) ->
     noise_mm=st.floats(0.0, 2.0),
     seed=st.integers(0, 2**31),
 )
+@example(lag_s=4.875, rate_Hz=7.0, noise_mm=0.0, seed=0)
 def test_the_lag_is_found_again(
     run: Run, tmp_path_factory: pytest.TempPathFactory, lag_s: float, rate_Hz: float, noise_mm: float, seed: int
 ) -> None:
@@ -82,7 +83,10 @@ def test_the_lag_is_found_again(
     for name in SIGNALS:
         log[name] += rng.normal(0.0, noise_mm, len(log))
     found = agreement_of(run, log, tmp_path_factory.mktemp("log"))
-    assert found.lag_s == pytest.approx(lag_s, abs=0.03)
+    # Seven samples a second do not always tell one period from the next; that is said then.
+    periods = round((found.lag_s - lag_s) / PERIOD_S)
+    assert found.lag_s - periods * PERIOD_S == pytest.approx(lag_s, abs=0.03)
+    assert not periods or (rate_Hz == 7.0 and any("as well" in note for note in found.notes))
     assert found.period_s == pytest.approx((PERIOD_S, PERIOD_S), rel=0.02)
     for one in found.signals.values():
         assert one.rms < 0.001 * noise_mm + 0.06 * one.amplitude[1]

@@ -61,6 +61,13 @@ def test_a_proposed_map_reads_the_log_right(kind: str, tmp_path: Path) -> None:
         np.testing.assert_allclose(read.values[name], values, rtol=1e-4, atol=1e-6)
 
 
+def test_a_number_at_the_end_of_a_name_is_no_unit(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text("t_s,seg_1,seg_2\n" + rows(*(np.arange(30.0) + shift for shift in range(3))))
+    proposal, missing = proposed_map(tmp_path / "log.csv")
+    assert tomllib.loads(proposal)["map"]["seg_2"] == {"signal": "stretch_length[2, mean]"}
+    assert missing == ['the unit of "seg_1"', 'the unit of "seg_2"']
+
+
 def test_several_animals_and_unknown_units_are_left_to_the_user(tmp_path: Path) -> None:
     names = "time,a.head.x,a.head.y,b.head.x,b.head.y\n"
     (tmp_path / "log.csv").write_text(names + rows(*(np.arange(30.0) + shift for shift in range(5))))

@@ -134,14 +134,14 @@ def checked_tree(root: ET.Element, rules: Rules) -> str:
     return ET.tostring(root, encoding="unicode")
 
 
-def parsed(text: str | bytes, rules: Rules) -> ET.Element:
-    """Returns the root of a text that is not checked yet.
+def parsed(text: str | bytes, rules: Rules, *, included: bool = False) -> ET.Element:
+    """Returns the root of a text that is not checked yet; one that is included may begin with <mujocoinclude>.
 
     Raises:
         ConfigError: It is no XML, has a document type, too many or too deep elements, or another root.
     """
     root = parse_xml(text, rules.what, rules.most_elements, rules.most_levels)
-    if root.tag not in ("mujoco", "mujocoinclude"):
+    if root.tag != "mujoco" and not (included and root.tag == "mujocoinclude"):
         remedy = _FOREIGN.get(root.tag.rpartition("}")[2], "an MJCF file begins with <mujoco>")
         raise ConfigError(f"begins with <{shown(root.tag)[1:-1]}>: {remedy}")
     return root

@@ -50,6 +50,7 @@ def read_mjcf(path: Path, rules: Rules = SCENE, rewrite: Callable[[ET.Element], 
         for element in root.iterfind("asset/*"):
             if element.tag in _SUFFIXES and "file" in element.attrib:
                 _write_in(element, path.parent, folder)
+        # Twice: with the lines of the file, then whole, with all that was included and written in.
         return checked(checked_tree(root, rules), rules)
     except ConfigError as error:
         raise ConfigError(f"{path}: {error}") from None
@@ -69,7 +70,7 @@ def _include(root: ET.Element, beside: Path, rules: Rules, read: list[Path]) -> 
                 )
             read.append(path.resolve())
             try:
-                content = parsed(read_bytes(path, "an included file", MOST_BYTES), rules)
+                content = parsed(read_bytes(path, "an included file", MOST_BYTES), rules, included=True)
                 _include(content, beside, rules, read)
             except ConfigError as error:
                 raise ConfigError(f"{path.name}: {error}") from None

@@ -101,14 +101,16 @@ def ground_findings(config: RunConfig, body: MeshBody) -> Iterator[Finding]:
         yield Finding("arena.slope_deg", slope_deg, problem, f"set arena.{field} above {steepness / relative:.2g}")
 
 
-def tolerance_findings(config: RunConfig, body: MeshBody, window: tuple[float, float] | None) -> Iterator[Finding]:
+def tolerance_findings(
+    config: RunConfig, body: MeshBody, window: tuple[float, float] | None, *, lags: bool
+) -> Iterator[Finding]:
     """Checks the sensors' tolerance against what a segment can lengthen by, and neighbours lift it by: the window."""
     if "tolerance_m" not in config.controller.sensor_fields:
         return
     shape, tolerance = rhombus_of(body), config.sensor.tolerance_m
     most = shape.longest_m - shape.along_m
     # Muscles that lag let segments pass each other at more than half of that (docs/robust.md).
-    share = 0.5 if body.model_dump().get("rings", {}).get("activation_dynamics", False) else 0.25
+    share = 0.5 if lags else 0.25
     low, high = window or (0.02 * most, share * most)
     instead = f"set about {(low + high) / 2 if window else 0.48 * high:.2g}"
     if tolerance >= most:

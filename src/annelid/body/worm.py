@@ -90,7 +90,8 @@ class WormBody(MeshBody):
             found += [*alike.formulation.findings(alone), *ground_findings(alone, alike)]
             of = f"segment {listed(str(segment + 1) for segment in segments)}: " if len(groups) > 1 else ""
             yield from (replace(one, problem=of + one.problem) for one in found)
-            yield from (replace(one, problem=of + one.problem) for one in tolerance_findings(config, alike, window))
+            found = tolerance_findings(config, alike, window, lags=alike.rings.lags)
+            yield from (replace(one, problem=of + one.problem) for one in found)
 
     def tolerance_window_m(self, friction: float) -> tuple[float, float] | None:
         """Estimates between which tolerances of the stretch sensors the paper's controller walks in order, m.
@@ -115,8 +116,7 @@ class WormBody(MeshBody):
         if len(self.groups()) > 1 or self.relative_friction is not None:
             return None
         damping_s, rings, rate = self.strands.damping_time_s, self.rings, self.springs.one_number("stiffness_N_per_m")
-        lagging = rings.model_dump().get("activation_dynamics", False)
-        measured = self.has_rigid_crossings and rings.muscle is not None and lagging and not self.has_halves
+        measured = self.has_rigid_crossings and rings.lags and not self.has_halves
         # Beyond what was measured the lines that were fitted say nothing.
         if not measured or self.springs.rest_length_m is not None or not rate or not 0.05 <= damping_s <= 0.4:
             return None

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from annelid.config import RunConfig, load_config, toml_value
+from annelid.config.loading import seen_from
 from annelid.output import write_text
 from annelid.textfiles import nested, toml_text
 
@@ -78,5 +79,5 @@ def write_worm(path: Path, source: str, fields: Mapping[str, Any], heading: Sequ
         fields: What differs, by dotted path.
         heading: Lines of a comment above.
     """
-    base = Path(source).resolve().as_posix() if source.endswith(".toml") else source
+    base = seen_from(Path.cwd(), source)
     write_text(path, toml_text({"extends": base, **nested(fields)}, "\n".join(heading)))

@@ -23,7 +23,8 @@ UNITS = {
 }  # fmt: skip
 """Units of columns: what each measures, by its SI unit, and how many of these it is."""
 Drift = Annotated[float, Field(ge=-0.2, le=0.2)]
-_UNIT_AT_END = re.compile(r"[_ (\[]+([A-Za-zµμ/%1]+)[)\]]?$")
+UNIT_AT_END = re.compile(r"[_ (\[]+([A-Za-zµμ/%]+|1(?=[)\]]))[)\]]?$")
+"""Finds the unit of a column, the first group, at the end of its name; a 1 outside brackets is a number."""
 
 
 class Column(Section):
@@ -91,7 +92,7 @@ def unit_of(name: str, given: str | None, what: str) -> tuple[str, float]:
     Raises:
         ConfigError: The unit is unknown, or there is none.
     """
-    found = _UNIT_AT_END.search(name)
+    found = UNIT_AT_END.search(name)
     unit = given or (found[1] if found else "")
     if (known := plain_unit(unit)) in UNITS:
         return UNITS[known]

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import gzip
 import json
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from annelid_lab.logs.maps import UNITS, plain_unit
+from annelid_lab.logs.maps import UNIT_AT_END, UNITS, plain_unit
 from annelid_lab.logs.measured import clock_times, points_of
 from annelid_lab.logs.tables import LogTable, read_table
 
-_UNIT = re.compile(r"(.*?)[_ (\[]+([A-Za-zµμ/%]+)[)\]]?")
 _SPELT_OUT = {"seconds": "s", "milliseconds": "ms", "meters": "m", "centimeters": "cm", "millimeters": "mm"}
 _TIME = re.compile(r"t|times?|zeit|timestamps?|clock|elapsed|date|date.?time|seconds|millis", re.IGNORECASE)
 _SEGMENT = re.compile(
@@ -43,7 +41,7 @@ def proposed_map(path: Path) -> tuple[str, list[str]]:
     """
     table = read_table(path, _names_in)
     points = _points_in(table)
-    head, missing = _head_of(path), []
+    missing = list[str]()
     lines = [f"# What the columns of {_quoted(path.name)} are, as far as their names say. Check every line."]
     time = next((name for name in table.names if _TIME.fullmatch(_split_unit(name, table)[0].rpartition(".")[2])), None)
     if time is not None:
@@ -54,13 +52,13 @@ def proposed_map(path: Path) -> tuple[str, list[str]]:
         elif not unit and clock_times(time, table) is None:
             lines += ['# time_unit = "s"   # s, ms, us or min: the log does not say']
             missing += ["time_unit, the unit of the time"]
-    elif rate := _RATE.search(head):
+    elif rate := _RATE.search(table.above):
         lines += [f"rate_Hz = {rate[1] or rate[2]}   # as the head of the file says"]
     else:
         lines += ["# rate_Hz = 25   # rows a second: the log does not say"]
         missing += ["rate_Hz, the rows a second"]
     if points:
-        length = _LENGTH_UNIT.search(head)
+        length = _LENGTH_UNIT.search(table.above)
         more, entries, unstated = _points_entries(points, _SPELT_OUT[length[1].lower()] if length else None)
         lines += more
     else:
@@ -144,18 +142,10 @@ def _split_unit(name: str, table: LogTable) -> tuple[str, str | None, bool]:
     """A column's name without its unit, the unit, and whether a map need not repeat it."""
     if name in table.units:
         return name, table.units[name], True
-    if match := _UNIT.fullmatch(name):
-        if (unit := plain_unit(match[2])) in UNITS:
-            return match[1], unit, True
+    if match := UNIT_AT_END.search(name):
+        base, unit = name[: match.start()], plain_unit(match[1])
+        if unit in UNITS:
+            return base, unit, True
         if unit.lower() in _SPELT_OUT:
-            return match[1], _SPELT_OUT[unit.lower()], False
+            return base, _SPELT_OUT[unit.lower()], False
     return name, None, False
-
-
-def _head_of(path: Path) -> str:
-    """The first characters of a text, where systems of motion capture state rate and units."""
-    try:
-        with (gzip.open if path.suffix.lower() == ".gz" else open)(path, "rb") as file:
-            return file.read(4000).decode("utf-8", errors="replace")
-    except OSError:
-        return ""

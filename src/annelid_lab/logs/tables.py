@@ -56,6 +56,7 @@ class LogTable:
         units: Units that stand in a row of their own, by column.
         notes: What was handled, a sentence each.
         decimal: The decimal sign of columns of text.
+        above: The lines above the header of a text.
     """
 
     path: Path
@@ -63,6 +64,7 @@ class LogTable:
     units: dict[str, str] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     decimal: str = "."
+    above: str = ""
 
     @property
     def names(self) -> Names:
@@ -170,7 +172,7 @@ def _with_header(path: Path, score: Score) -> LogTable:
         units = {}
     if place - above > 1:
         notes.append(f"{place - above} lines above the header left out")
-    return LogTable(path, cells, units, notes, decimal)
+    return LogTable(path, cells, units, notes, decimal, "\n".join(" ".join(row) for row in head[:place]))
 
 
 def _lines(path: Path, notes: Names) -> Names:

@@ -115,6 +115,11 @@ class ActuatorKind(Kind):
         """The section itself where it is of muscles."""
         return None
 
+    @property
+    def lags(self) -> bool:
+        """Whether activation follows its command with the lag of a muscle."""
+        return False
+
     def first_act(self, model: mujoco.MjModel) -> Array:
         """Returns the engine's actuator states at the start, ``(n_states,)``."""
         return np.zeros(model.na)

@@ -68,6 +68,11 @@ class Rings(ActuatorKind):
         """The section itself."""
         return self
 
+    @property
+    def lags(self) -> bool:
+        """Whether its field says so."""
+        return self.activation_dynamics
+
     def states_after(
         self, model: mujoco.MjModel, activation: Array, state: Array, length_m: Array, time_s: float
     ) -> Array:

@@ -4,11 +4,13 @@ Prints, for the paper's robot with rigid crossings, every switch of a stretch se
 segments' lengthening, mm: as the preset is, with small and large tolerances, with stiff strands, and without the
 damping across the bend (docs/robust.md). Takes about two minutes. With ``--windows`` it measures, under a timed wave,
 what `annelid.plausibility.tolerance_window_m` estimates: how far neighbours lift a segment at rest, and the length at
-which the releasing and the next segment are equally long.
+which the releasing and the next segment are equally long. With ``--walks`` it runs the paper's network with tolerances
+about the edges of the window.
 
     python benchmarks/sensor_events.py
     python benchmarks/sensor_events.py --windows --csv docs/results/tolerance_windows.csv
     python benchmarks/sensor_events.py --windows --step-ms 1
+    python benchmarks/sensor_events.py --walks --csv docs/results/tolerance_walks.csv
 """
 
 from __future__ import annotations
@@ -39,7 +41,7 @@ def strands(modulus_GPa: float) -> dict[str, Any]:
 CASES: dict[str, dict[str, Any]] = {
     "as it is": {},
     "tolerance 1 mm": {"sensor.tolerance_m": 0.001},
-    "tolerance 40 mm": {"sensor.tolerance_m": 0.04},
+    "tolerance 65 mm": {"sensor.tolerance_m": 0.065},
     "0.8 GPa, friction 0.1": {**strands(0.8), "arena.friction": 0.1},
     "0.8 GPa, friction 0.1, tolerance 26 mm": {**strands(0.8), "arena.friction": 0.1, "sensor.tolerance_m": 0.026},
 }
@@ -52,6 +54,14 @@ WINDOWS = [
     *((modulus, friction, damping) for modulus in (0.3, 0.8) for friction in (1.0, 0.3) for damping in (0.08, 0.1)),
 ]
 """Young's modulus, GPa, friction, and damping time, s."""
+WALKS = {
+    (0.3, 1.0): (8, 10, 12, 15, 25, 35, 45, 55, 65),
+    (0.8, 1.0): (12, 15, 18, 22, 40, 55, 65),
+    (0.8, 0.3): (15, 18, 21, 25, 35, 45, 55, 65),
+    (1.2, 1.0): (22, 26, 30, 34, 38, 49, 55, 65),
+    (2.0, 1.0): (31, 36, 42, 48, 55, 65),
+}
+"""Tolerances, mm, that are tried with rods of a modulus, GPa, and friction."""
 DURATION_S, SHOWN_S = 6.0, 3.7
 
 
@@ -118,12 +128,39 @@ def print_windows(path: Path | None, step_s: float) -> None:
         write_csv(path, heads, rows)
 
 
+def print_walks(path: Path | None) -> None:
+    rows = []
+    for (modulus, friction), tolerances_mm in WALKS.items():
+        fields = {**strands(modulus), "arena.friction": friction, "duration_s": 8.0}
+        walks, lost = [], []
+        for tolerance_mm in tolerances_mm:
+            config = load_config("riddle2023-rods", {**fields, "sensor.tolerance_m": tolerance_mm / 1e3})
+            with tempfile.TemporaryDirectory() as folder:
+                found = rhythm_score(simulate(config, folder, progress=False, overwrite=True))
+            in_time = found.period_s is not None and abs(found.period_s / (3 * DESIGN_INTERVAL_S) - 1.0) < 0.1
+            (walks if found.verdict == "ordered" and in_time else lost).append(tolerance_mm)
+        window = tolerance_window_m(load_config("riddle2023-rods", fields))
+        assert window is not None
+        print(
+            f"{modulus} GPa, friction {friction}: walks with {walks}, not with {lost} mm, window {window}", flush=True
+        )
+        rows.append(
+            [modulus, friction, *(", ".join(map(str, one)) for one in (lost, walks)), *(1e3 * e for e in window)]
+        )
+    if path:
+        write_csv(path, ["modulus_GPa", "friction", "lost_mm", "walks_mm", "lower_mm", "upper_mm"], rows)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--windows", action="store_true", help="measure windows of the tolerance")
+    parser.add_argument("--walks", action="store_true", help="run the paper's network about the windows' edges")
     parser.add_argument("--csv", type=Path, help="file for these")
     parser.add_argument("--step-ms", type=float, default=10.0, help="of these runs, ms")
     given = parser.parse_args()
+    if given.walks:
+        print_walks(given.csv)
+        return
     if given.windows:
         print_windows(given.csv, given.step_ms / 1e3)
         return

@@ -156,8 +156,10 @@ def parse_xml(text: str | bytes, what: str, most_elements: int, most_levels: int
     parser = ET.XMLParser(target=builder)
     try:
         # Line by line, so that elements know theirs. UTF-16 has its line feeds elsewhere.
+        flush = getattr(parser, "flush", lambda: None)  # Newer parsers put off what is not complete.
         for builder.line, line in enumerate(text.splitlines(keepends=True), start=1):
             parser.feed(line)
+            flush()
         return parser.close()
     except (ET.ParseError, ValueError, LookupError) as error:
         raise ConfigError(f"is not valid XML: {shortened(str(error))}") from None

@@ -50,6 +50,8 @@ def test_what_does_not_go_together_is_refused(annelid: Command, run: Path) -> No
     before = sorted(run.rglob("*"))
     for arguments, words in (
         (("--to", "xlsx"), "unknown format 'xlsx'"),
+        (("--to", "gif"), "annelid draw RUN --video FILE.gif"),
+        (("--to", "mp4"), "annelid draw RUN --video FILE.mp4"),
         (("--to", "html", "--every", "2"), "--every has no effect on html, which takes --from-time, --to-time"),
         (("--to", "mjcf", "--to-time", "1"), "--to-time has no effect on mjcf, which takes the whole run"),
         (("--to", "mat", "-o", "run.csv"), "must end in .mat"),
@@ -84,6 +86,12 @@ def test_compare_with_a_measured_log(annelid: Command, run: Path) -> None:
     done = annelid("compare", run, "log.csv", "--map", "map.toml", "-o", "robot")
     assert done.exit_code == 0, done.err
     assert done.out.split()[-2:] == ["robot/agreement.json", "robot/agreement.png"]
+    proposed = annelid("compare", run, "log.csv")
+    assert proposed.exit_code == 2
+    assert "log.map.toml is a proposal" in proposed.sentence()
+    assert annelid("compare", "--map-for", "log.csv").out == Path("log.map.toml").read_text()
+    assert "there is log.map.toml" in annelid("compare", run, "log.csv").sentence()
+    assert "takes a log alone" in annelid("compare", run, "--map-for", "log.csv").err
     read = json.loads(annelid("compare", run, "log.csv", "--map", "map.toml", "--json").out)
     assert read == json.loads(Path("robot/agreement.json").read_text())
     assert read["lag_s"] == pytest.approx(-7.0)

@@ -38,10 +38,6 @@ EXCEPTIONS = {
     ("docs/paper.md", "#"): "the same",
     ("docs/troubleshooting.md", "code"): "exit codes, not results",
     ("docs/presets.md", "field"): "fields of a preset, which tests/test_presets.py compares with its sources",
-    (
-        "docs/robust.md",
-        "modulus (GPa)",
-    ): "single runs beside the rule, whose edges a slow test of tests/test_plausibility.py runs",
     ("docs/validation.md", "formulation"): "printed by `pytest -m slow -s tests/body/test_ring_down.py`",
     ("docs/validation.md", "step (ms)"): "the same",
     ("docs/wire.md", "bytes"): "the protocol, not results",

@@ -262,6 +262,7 @@ def test_what_a_robot_includes_is_read_from_its_folder(tmp_path: Path) -> None:
     [
         ("<mujoco>\n<worldbody>\n<flexcomp/></worldbody></mujoco>", "line 3: <flexcomp>.*write its bodies out"),
         ('<mujoco>\n<worldbody>\n<composite type="cable" count="2"/></worldbody></mujoco>', "line 3: .*needs vertex="),
+        ("<mujoco>\n<worldbody>\n<flexcomp\n name='a'\n dim='2'\n/></worldbody></mujoco>", "line 6: <flexcomp>"),
         ("<mujocoinclude/>", "an MJCF file begins with <mujoco>"),
         ('<robot name="worm"/>', "this is URDF; load it in MuJoCo and save it"),
         ('<Lems><include file="Cells.xml"/></Lems>', "a network of NeuroML; write it as TOML"),

@@ -63,6 +63,8 @@ def compare_command(
     """
     runs = runs or []
     if map_for is not None:
+        if runs or log_map or output or view:
+            raise typer.BadParameter("--map-for takes a log alone: annelid compare --map-for LOG > MAP.toml")
         from annelid_lab.logs import proposed_map
 
         proposal, missing = proposed_map(map_for)
@@ -112,6 +114,7 @@ def compare_command(
 
 def _propose_map(run: Path, log: Path) -> NoReturn:
     """Writes a map for a log that came without one, and says how to go on."""
+    from annelid.output import write_text
     from annelid_lab.logs import proposed_map
 
     own = Path(f"{log.name.partition('.')[0]}.map.toml")
@@ -119,7 +122,7 @@ def _propose_map(run: Path, log: Path) -> NoReturn:
     if own.exists():
         raise ConfigError(f"a log needs a map, and there is {own}: {go_on}")
     proposal, missing = proposed_map(log)
-    own.write_text(proposal, encoding="utf-8")
+    write_text(own, proposal)
     to_do = f"state in it {'; '.join(missing)}" if missing else "check it"
     raise ConfigError(f"a log needs a map of its columns. {own} is a proposal: {to_do}. Then: {go_on}")
 

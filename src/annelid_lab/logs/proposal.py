@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from annelid.textfiles import toml_value
 from annelid_lab.logs.maps import UNIT_AT_END, UNITS, plain_unit
 from annelid_lab.logs.measured import clock_times, points_of
 from annelid_lab.logs.tables import LogTable, read_table
@@ -42,10 +42,10 @@ def proposed_map(path: Path) -> tuple[str, list[str]]:
     table = read_table(path, _names_in)
     points = _points_in(table)
     missing = list[str]()
-    lines = [f"# What the columns of {_quoted(path.name)} are, as far as their names say. Check every line."]
+    lines = [f"# What the columns of {toml_value(path.name)} are, as far as their names say. Check every line."]
     time = next((name for name in table.names if _TIME.fullmatch(_split_unit(name, table)[0].rpartition(".")[2])), None)
     if time is not None:
-        lines += [f"time = {_quoted(time)}"]
+        lines += [f"time = {toml_value(time)}"]
         unit, is_stated = _split_unit(time, table)[1:]
         if unit and not is_stated:
             lines += [f'time_unit = "{unit}"']
@@ -76,18 +76,18 @@ def _points_entries(
     (first, (individuals, own)), *others = points.items()
     lines, missing = [], []
     if len(individuals) > 1:
-        lines += [f"# individual = {_quoted(individuals[0])}   # one of {', '.join(map(_quoted, individuals))}"]
+        lines += [f"# individual = {toml_value(individuals[0])}   # one of {', '.join(map(toml_value, individuals))}"]
         missing += ["individual, the animal to compare"]
     if not (own or unit):
         lines += ["# m_per_px = 0.001   # metres in a pixel: the log does not say"]
         missing += ["m_per_px, the metres in a pixel"]
     stated = "" if own or not unit else f', unit = "{unit}"'
-    entries = [f'{_quoted(first)} = {{ signal = "travel"{stated} }}']
+    entries = [f'{toml_value(first)} = {{ signal = "travel"{stated} }}']
     if others:
-        last = _quoted(others[-1][0])
+        last = toml_value(others[-1][0])
         entries += [
             "# The distance of two points, in place of the travel of one:",
-            f'# {_quoted(first)} = {{ signal = "ring_distance[1]", distance_to = {last}{stated} }}',
+            f'# {toml_value(first)} = {{ signal = "ring_distance[1]", distance_to = {last}{stated} }}',
         ]
     return lines, entries, missing
 
@@ -104,21 +104,16 @@ def _signals_entries(names: Sequence[str], table: LogTable) -> tuple[list[str], 
         elif _TRAVEL.fullmatch(base):
             signal = "travel"
         else:
-            entries += [f'# {_quoted(name)} = ""   # not recognised']
+            entries += [f'# {toml_value(name)} = ""   # not recognised']
             continue
         if unit is None:
-            entries += [f'{_quoted(name)} = {{ signal = "{signal}" }}   # unit = "mm"? the log does not say']
-            missing += [f"the unit of {_quoted(name)}"]
+            entries += [f'{toml_value(name)} = {{ signal = "{signal}" }}   # unit = "mm"? the log does not say']
+            missing += [f"the unit of {toml_value(name)}"]
         elif is_stated:
-            entries += [f'{_quoted(name)} = "{signal}"']
+            entries += [f'{toml_value(name)} = "{signal}"']
         else:
-            entries += [f'{_quoted(name)} = {{ signal = "{signal}", unit = "{unit}" }}']
+            entries += [f'{toml_value(name)} = {{ signal = "{signal}", unit = "{unit}" }}']
     return entries, missing
-
-
-def _quoted(text: str) -> str:
-    """A text as TOML has it."""
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def _names_in(names: Sequence[str]) -> int:

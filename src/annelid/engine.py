@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from importlib.metadata import Distribution, PackageNotFoundError, distribution
+from pathlib import Path
 
 from annelid.errors import MixedEngine
 
@@ -21,7 +22,7 @@ def mixed_engine() -> str | None:
         return None
     return (
         f"mujoco {other.version} and mujoco-core {core.version} are installed over each other: {len(differ)} files of "
-        f"one are in the other's place, such as {differ[0].rsplit('/site-packages/')[-1]}"
+        f"one are in the other's place, such as {Path(differ[0]).name}"
     )
 
 

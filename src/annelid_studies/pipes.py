@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import pi
 from pathlib import Path
@@ -17,7 +17,7 @@ from annelid.experiment import Case, Store
 from annelid.morphology import Array
 from annelid.simulation import Run
 from annelid_studies.standard_cases import Effort
-from annelid_studies.tables import Results, fields_table, grouped, write_fields
+from annelid_studies.tables import Results, TerminalTable, grouped, tabulated, terminal_table, write_fields
 
 PRESET = "riddle2025-muscles"
 CM = 100.0
@@ -162,7 +162,23 @@ def study(store: Store, output: Path, effort: Effort) -> Results:
     """The study `pipes`."""
     readings, courses = pass_pipes(store, trials(effort == "quick"))
     path = write_fields(Reading, readings, output / "pipes.csv")
-    return (path, pipes_picture(readings, courses, path.with_suffix(""))), [fields_table(readings, "Pipes")]
+    return (path, pipes_picture(readings, courses, path.with_suffix(""))), [pipes_table(readings)]
+
+
+def pipes_table(readings: Sequence[Reading]) -> TerminalTable:
+    """Lays out readings for the terminal."""
+    yes = {True: "yes", False: "no", None: "-"}
+    columns: Mapping[str, Callable[[Reading], str]] = {
+        "pipe": lambda one: f"bend {one.radius_m:g} m" if one.radius_m else one.arena,
+        "gait": lambda one: one.gait,
+        "passed": lambda one: yes[one.passed],
+        "speed (cm/s)": lambda one: f"{CM * one.speed_m_per_s:.2f}",
+        "front at (m)": lambda one: f"{one.front_m:.2f}",
+        "in order": lambda one: yes[one.in_order],
+        "net work (J/m)": lambda one: "-" if one.work_J_per_m is None else f"{one.work_J_per_m:.0f}",
+        "slip ratio": lambda one: "-" if one.slip_ratio is None else f"{one.slip_ratio:.2f}",
+    }
+    return terminal_table(tabulated(readings, columns), "Pipes", n_words=2)
 
 
 def pipes_picture(readings: Sequence[Reading], courses: Courses, stem: Path) -> Path:

@@ -7,7 +7,7 @@ What the scripts do state as numbers stands below.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil, nan
 from pathlib import Path
@@ -22,7 +22,7 @@ from annelid.experiment import Case, Store
 from annelid.morphology import Array
 from annelid.simulation import Run
 from annelid_studies.standard_cases import Effort
-from annelid_studies.tables import Results, fields_table, grouped, write_fields
+from annelid_studies.tables import Results, TerminalTable, grouped, tabulated, terminal_table, write_fields
 
 CM = 100.0
 Ground = Literal["flat", "straight pipe", "bend"]
@@ -215,9 +215,24 @@ def study(store: Store, output: Path, effort: Effort) -> Results:
     """The study `riddle2025`."""
     readings = compare(store, points(effort == "quick"))
     path = write_fields(Reading, readings, output / "riddle2025.csv")
-    return (path, comparison_picture(readings, path.with_suffix(""))), [
-        fields_table(readings, "The authors' later robot")
-    ]
+    return (path, comparison_picture(readings, path.with_suffix(""))), [comparison_table(readings)]
+
+
+def comparison_table(readings: Sequence[Reading]) -> TerminalTable:
+    """Lays out readings for the terminal."""
+    columns: Mapping[str, Callable[[Reading], str]] = {
+        # Lines end where they may, so that on a narrow terminal no number breaks.
+        "ground": lambda one: f"bend {one.radius_m:g} m" if one.ground == "bend" else one.ground.replace(" ", "\n"),
+        "gait": lambda one: (one.gait + (", half step" if one.half_step else "")).replace(", ", ",\n"),
+        "friction": lambda one: f"{one.friction:g}",
+        "speed (cm/s)": lambda one: f"{CM * one.speed_m_per_s:.2f}",
+        "95 % interval (cm/s)": lambda one: (
+            "-" if one.runs < 2 else f"{CM * one.low_m_per_s:.2f}..{CM * one.high_m_per_s:.2f}"
+        ),
+        "front out": lambda one: f"{one.came_out} of {one.runs}" if one.ground == "bend" else "",
+        "least way (m)": lambda one: f"{one.least_front_m:.2f}",
+    }
+    return terminal_table(tabulated(readings, columns), "The authors' later robot", n_words=2)
 
 
 def comparison_picture(readings: Sequence[Reading], stem: Path) -> Path:

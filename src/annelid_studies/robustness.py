@@ -141,7 +141,8 @@ def robustness(
     """Walks the first points of the sample under each controller, as far as the folder does not have their runs.
 
     Args:
-        folder: Folder of the results, ``robustness.json`` and ``robustness.md``; runs go to ``runs`` within it.
+        folder: Folder of the results; runs go to ``runs`` within it. ``robustness.json`` and ``robustness.md`` are of
+            all of the sample's runs that are there, also those of other calls, and are written also when interrupted.
         n_points: How many points, in the order drawn.
         controllers: Some of `CONTROLLERS`.
         n_segments: Gives every worm this many segments in place of its own, for a sample of the other quantities
@@ -150,7 +151,7 @@ def robustness(
         progress: Called before the first and after every run.
 
     Returns:
-        The judgements, by controller and point.
+        The judgements of all of the sample's runs that the folder holds now, by controller and point.
 
     Raises:
         ConfigError: No points, more than the sample has, or an unknown controller.
@@ -164,17 +165,27 @@ def robustness(
             raise ConfigError(f"unknown controller {controller!r}: {suggest(controller, CONTROLLERS)}")
     if n_segments is not None:
         sample = tuple(replace(point, n_segments=n_segments) for point in sample)
-    cases = {(kind, i): sample[i].case(kind) for kind in controllers for i in range(n_points)}
     store = Store(folder / "runs", executor, progress=progress)
-    store.compute(cases.values(), "robustness")
+    try:
+        store.compute([point.case(kind) for kind in controllers for point in sample[:n_points]], "robustness")
+    finally:
+        if judged := _judged(store, sample):
+            found = shares(judged)
+            content = {"shares": found, "judged": [*map(asdict, judged)]}
+            write_text(folder / RESULTS, json.dumps(content, indent=1) + "\n")
+            write_text(folder / "robustness.md", shares_table(found) + "\n")
+    return judged
+
+
+def _judged(store: Store, sample: Sequence[Point]) -> list[Judged]:
+    """Judges every run of the sample that the store has."""
     judged = []
-    for (kind, i), case in cases.items():
-        run = store.run(case)
-        scores = rhythm_score(run, SETTLING_S), lengthening_score(run, SETTLING_S)
-        judged.append(judge(i, sample[i], kind, *scores, store[case].message))
-    found = shares(judged)
-    write_text(folder / RESULTS, json.dumps({"shares": found, "judged": [*map(asdict, judged)]}, indent=1) + "\n")
-    write_text(folder / "robustness.md", shares_table(found) + "\n")
+    for kind in CONTROLLERS:
+        for i, point in enumerate(sample):
+            if (case := point.case(kind)) in store:
+                run = store.run(case)
+                scores = rhythm_score(run, SETTLING_S), lengthening_score(run, SETTLING_S)
+                judged.append(judge(i, point, kind, *scores, store[case].message))
     return judged
 
 

@@ -48,21 +48,6 @@ def terminal_table(table: Table, title: str, *, n_words: int = 1, caption: str =
     return shown
 
 
-def fields_table(readings: Sequence[Any], title: str) -> TerminalTable:
-    """Returns readings, of one dataclass with slots, for the terminal: a column for every field but the command."""
-    names = [name for name in type(readings[0]).__slots__ if name != "command"]
-    rows = [[_shown(getattr(one, name)) for name in names] for one in readings]
-    return terminal_table(Table([name.replace("_", " ") for name in names], rows), title)
-
-
-def _shown(value: object) -> str:
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if value is None or value != value:
-        return "-"
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
-
-
 def write_fields(kind: type[Any], readings: Iterable[Any], path: Path) -> Path:
     """Writes readings, of a dataclass with slots, as CSV, a column for every field and a row each."""
     return write_csv(path, kind.__slots__, map(astuple, readings))

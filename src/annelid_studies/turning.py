@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from annelid.draw import canvas, draw_lines, line_looks, panel_title, save_both
 from annelid.errors import RunFileError
 from annelid.experiment import Case, Store
 from annelid_studies.standard_cases import Effort
-from annelid_studies.tables import Results, fields_table, grouped, write_fields
+from annelid_studies.tables import Results, TerminalTable, grouped, tabulated, terminal_table, write_fields
 
 COUNTER = (1.0, 1.0, -1.0, -1.0, 1.0, 1.0)
 """Shares of six segments: the ends bend to one side, the middle to the other."""
@@ -163,7 +163,22 @@ def study(store: Store, output: Path, effort: Effort) -> Results:
     """The study `turning`."""
     readings, tracks = turning(store, QUICK if effort == "quick" else MODULATIONS)
     path = write_fields(Reading, readings, output / "turning.csv")
-    return (path, turning_picture(readings, tracks, path.with_suffix(""))), [fields_table(readings, "Turning")]
+    return (path, turning_picture(readings, tracks, path.with_suffix(""))), [turning_table(readings)]
+
+
+def turning_table(readings: Sequence[Reading]) -> TerminalTable:
+    """Lays out readings for the terminal."""
+    columns: Mapping[str, Callable[[Reading], str]] = {
+        "gait": lambda one: one.gait,
+        "modulation": lambda one: f"{one.modulation:g}",
+        "in order": lambda one: {True: "yes", False: "no", None: "-"}[one.wave],
+        "cycle (s)": lambda one: f"{one.cycle_s:.2f}",
+        "speed (m/s)": lambda one: f"{one.speed_m_per_s:.3f}",
+        "turn a cycle (deg)": lambda one: f"{one.turn_deg_per_cycle:.1f}",
+        "radius (m)": lambda one: f"{one.radius_m:.3g}",
+        "rolled (deg)": lambda one: f"{one.roll_deg:.0f}",
+    }
+    return terminal_table(tabulated(readings, columns), "Turning")
 
 
 def turning_picture(readings: Sequence[Reading], tracks: Sequence[Track], stem: Path) -> Path:

@@ -50,6 +50,8 @@ def test_what_does_not_go_together_is_refused(annelid: Command, run: Path) -> No
     before = sorted(run.rglob("*"))
     for arguments, words in (
         (("--to", "xlsx"), "unknown format 'xlsx'"),
+        (("--to", "gif"), "annelid draw RUN --video FILE.gif"),
+        (("--to", "mp4"), "annelid draw RUN --video FILE.mp4"),
         (("--to", "html", "--every", "2"), "--every has no effect on html, which takes --from-time, --to-time"),
         (("--to", "mjcf", "--to-time", "1"), "--to-time has no effect on mjcf, which takes the whole run"),
         (("--to", "mat", "-o", "run.csv"), "must end in .mat"),

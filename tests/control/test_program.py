@@ -92,6 +92,8 @@ def test_a_bad_contraction_is_refused_in_one_sentence(subtests: pytest.Subtests)
 
 
 def test_a_segment_must_exist_on_whatever_body() -> None:
+    with pytest.raises(ConfigError, match=r"segment 4, but the worm has segments 1 \.\. 3"):
+        ProgramController(program((4, 0.0, 1.0, 1.0)), 3, 3)
     with pytest.raises(ConfigError, match=r"n_muscles = 5 .* give 3 \(rings\) or 6 \(half-rings\)"):
         ProgramController(program(), 3, 5)
     assert load_config("riddle2023-rods", {**programmed({**ONE, "segment": 4}), "body.mesh.n_segments": 4}).seed == 0

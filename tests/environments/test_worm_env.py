@@ -16,6 +16,7 @@ from worms import CHEAP, same
 
 from annelid.body.worm import WormBody
 from annelid.environments import ENVIRONMENTS, WormEnv
+from annelid.environments.task import Weights
 from annelid.errors import AnnelidError, ConfigError, MissingDependency
 from annelid_studies.riddle2023.figures.renderings import rendering_works
 
@@ -137,6 +138,21 @@ def test_an_observation_taken_apart_and_laid_out_is_itself(env: WormEnv, seed: i
     assert np.allclose(again, observation, atol=1e-6)
     far = {entry.name: np.full(entry.shape, 99.0) for entry in env.layout.entries}
     assert np.all(env.layout.packed(far) == 1.0)
+
+
+def test_terms_of_the_reward_are_in_proportion_to_their_weights() -> None:
+    weights, usual = {"progress": 2, "effort": 3, "slip": 5, "failure": 7}, Weights()
+    found = set()
+    for changes in ({}, {"guard.edge_strain": 1e-4}):
+        default, weighted = worm_env(changes), worm_env(changes, weights=weights)
+        for env in (default, weighted):
+            env.reset(seed=3)
+        before, after = (env.step(np.ones(3))[4] for env in (default, weighted))
+        for name, weight in weights.items():
+            term = before[f"reward_{name}"]
+            assert after[f"reward_{name}"] == pytest.approx(term * weight / getattr(usual, name), rel=1e-12, abs=0.0)
+            found |= {name} if term else set()
+    assert found == set(weights), "each term counted once at least"
 
 
 def test_a_worm_whose_numbers_run_away_ends_the_episode_and_can_begin_anew() -> None:

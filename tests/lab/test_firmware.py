@@ -107,7 +107,8 @@ def test_a_network_gives_the_same_bits_where_sums_are_in_the_same_order(
     seed: int, benchmark: ModuleType, exactly: Callable[..., float], tmp_path: Path
 ) -> None:
     network, scheme = benchmark.random_network(seed), ("euler", "toolbox", "heun")[seed % 3]
-    assert exactly(network, tmp_path, 500, scheme) == 0.0
+    steps = 500 if seed < 3 else 100_000
+    assert exactly(network, tmp_path, steps, scheme) == 0.0
     # With the sums of BLAS only last digits differ, so the order is the only difference.
     assert benchmark.largest_difference(network, tmp_path, 500, scheme, ordered=False) < 1e-9
 

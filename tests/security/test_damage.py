@@ -107,6 +107,19 @@ def test_a_large_file_is_compared_on_demand_only(run: Run, tmp_path: Path, monke
     assert done.stderr.rstrip().endswith(f"{path} is damaged: it is not as it was when the run ended")
 
 
+@pytest.mark.parametrize("error", [KeyboardInterrupt(), OSError(5, "Input/output error")])
+def test_a_digest_that_cannot_be_written_ends_the_run_with_its_own_error(
+    error: BaseException, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object) -> None:
+        raise error
+
+    monkeypatch.setattr(digest, "write", refuse)
+    with pytest.raises(RunFileError if isinstance(error, OSError) else KeyboardInterrupt):
+        simulate(load_config("riddle2022-planar", {"duration_s": 0.05}), tmp_path / "run", progress=False)
+    assert open_run(tmp_path / "run").status == "complete"
+
+
 def test_a_run_whose_last_samples_cannot_be_written_is_not_complete(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -34,6 +34,7 @@ def test_an_engine_over_another_is_seen(tmp_path: Path, monkeypatch: pytest.Monk
     assert isinstance(refused.value, ImportError)
     for word in ("mujoco 3.17.0", "mujoco-core 4.0.1", "1 files", "LICENSE", REMEDY):
         assert word in str(refused.value)
+    assert tmp_path.name not in str(refused.value), "no folder of a user"
     engine = next(finding for finding in examine() if finding.item == "mujoco")
     assert not engine.ok
     assert REMEDY in engine.line()

@@ -8,12 +8,16 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
-from annelid.cli import app
+from annelid.cli import app, entry
+from annelid.cli.run import locked_folder
 from annelid.config import load_config
 from annelid.errors import RunFileError
 from annelid.simulation import open_run, simulate
@@ -115,6 +119,35 @@ def test_what_a_lock_file_says_cannot_steer_the_terminal(tmp_path: Path) -> None
 def test_a_folder_that_cannot_be_made_is_said_to_be_one() -> None:
     with pytest.raises(RunFileError, match="it cannot be made"), locked("/proc/nowhere/run"):
         pass
+
+
+@pytest.fixture
+def _threads_change_often() -> Iterator[None]:
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-5)
+    yield
+    sys.setswitchinterval(before)
+
+
+@pytest.mark.usefixtures("_threads_change_often")
+def test_numbered_folders_are_taken_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    together, everyone_has_one = threading.Barrier(4), threading.Barrier(4)
+
+    def begin() -> Path:
+        with ExitStack() as stack:
+            entry._locks.set(stack)
+            together.wait(60)
+            try:
+                return locked_folder(None, "worm")
+            finally:
+                everyone_has_one.wait(60)
+
+    with ThreadPoolExecutor(4) as threads:
+        taken = [each.result() for each in [threads.submit(begin) for _ in range(4)]]
+    assert sorted(taken) == [Path("runs", f"worm-{i:03d}") for i in range(1, 5)]
+    # Nothing was written into them.
+    assert list(tmp_path.glob("*/*")) == []
 
 
 def test_of_two_runs_into_one_folder_one_is_there_whole_and_the_other_is_told(tmp_path: Path) -> None:

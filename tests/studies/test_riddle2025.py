@@ -16,11 +16,12 @@ from annelid_studies.riddle2025 import (
     Reading,
     cases,
     comparison_picture,
+    comparison_table,
     points,
     repeated,
     speed_of_line,
 )
-from annelid_studies.tables import fields_table, write_fields
+from annelid_studies.tables import write_fields
 
 
 def reading(**changes: object) -> Reading:
@@ -82,11 +83,11 @@ def test_readings_are_written_told_and_drawn(tmp_path: Path) -> None:
     readings = [reading(), flat, finer]
     with write_fields(Reading, readings, tmp_path / "x.csv").open(newline="", encoding="utf-8") as file:
         assert [row["runs"] for row in csv.DictReader(file)] == ["3", "3", "1"]
-    cells = {column.header: list(column.cells) for column in fields_table(readings, "x").columns}
-    assert cells["ground"] == ["bend", "flat", "bend"]
-    assert cells["low\nm\nper\ns"] == ["0.02", "0.02", "-"]
-    assert cells["half\nstep"] == ["no", "no", "yes"]
-    assert "command" not in cells
+    cells = [list(column.cells) for column in comparison_table(readings).columns]
+    assert cells[0] == ["bend 0.5 m", "flat", "bend 0.5 m"]
+    assert cells[1] == ["3x1", "3x1", "3x1,\nhalf step"]
+    assert cells[4] == ["2.00..4.00", "2.00..4.00", "-"]
+    assert cells[5] == ["3 of 3", "", "3 of 1"]
     for some in (readings, []):
         path = comparison_picture(some, tmp_path / "x")
         assert path.stat().st_size > 1000

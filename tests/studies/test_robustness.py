@@ -129,6 +129,29 @@ def test_the_study_keeps_its_results_and_goes_on(tmp_path: Path) -> None:
     assert content["shares"]["sns"]["in_time"] == 0
 
 
+@pytest.mark.usefixtures("short")
+def test_a_call_for_fewer_runs_leaves_the_others_in_the_tables(tmp_path: Path) -> None:
+    pair = study.robustness(tmp_path, 1, controllers=["sns", "sns-robust"])
+    content, table = ((tmp_path / f"robustness.{kind}").read_text() for kind in ("json", "md"))
+    assert study.robustness(tmp_path, 1, controllers=["sns-robust"]) == pair
+    assert (tmp_path / "robustness.json").read_text() == content
+    assert (tmp_path / "robustness.md").read_text() == table
+    assert "`sns`" in table
+
+
+@pytest.mark.usefixtures("short")
+def test_an_interrupted_call_leaves_the_tables_of_what_there_is(tmp_path: Path) -> None:
+    def interrupt(stage: str, done: int, n: int, share: float) -> None:
+        if done:  # By now this process has computed both, and told of one.
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        study.robustness(tmp_path, 1, controllers=["sns", "sns-robust"], progress=interrupt)
+    content = json.loads((tmp_path / "robustness.json").read_text())
+    assert [one["controller"] for one in content["judged"]] == ["sns", "sns-robust"]
+    assert "`sns`" in (tmp_path / "robustness.md").read_text()
+
+
 def test_an_unknown_controller_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="unknown controller 'shc'"):
         study.robustness(tmp_path, 1, controllers=["shc"])

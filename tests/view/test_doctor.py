@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import ctypes
 import sys
+from importlib.metadata import PackageNotFoundError, version
 
 import pytest
 
@@ -34,3 +35,24 @@ def test_an_engine_that_cannot_be_imported_is_a_finding(monkeypatch: pytest.Monk
     line = finding("mujoco")
     assert line.startswith("missing")
     assert line.endswith("cannot be imported (ArgumentError): unset MUJOCO_GL")
+
+
+def test_a_value_of_mujoco_gl_that_names_no_back_end_is_not_printed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MUJOCO_GL", "secret-token")
+    lines = [each.line() for each in doctor.examine()]
+    assert not [line for line in lines if "secret" in line]
+    assert any("OpenGL of MUJOCO_GL" in line for line in lines)
+    assert finding("frames and videos").endswith("unset MUJOCO_GL")
+
+
+def test_an_engine_of_another_name_is_not_enough(monkeypatch: pytest.MonkeyPatch) -> None:
+    def found(name: str) -> str:
+        if name == "mujoco-core":
+            raise PackageNotFoundError(name)
+        return version(name)
+
+    monkeypatch.setattr(doctor, "works", lambda backend: True)
+    monkeypatch.setattr(doctor, "version", found)
+    line = finding("mujoco-core")
+    assert line.startswith("missing")
+    assert line.endswith(doctor.REMEDY)

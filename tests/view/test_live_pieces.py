@@ -19,6 +19,7 @@ from annelid.live.lines_and_arrows import Painter, painter_of
 from annelid.live.live_worm import LiveWorm, knobs_of
 from annelid.live.panel import MOST_SAMPLES, plots_of
 from annelid.live.player import Player, player_of
+from annelid.live.requests import Requests
 from annelid.live.scene_geoms import triangles
 from annelid.simulation.runfile import Run
 from annelid.simulation.worm import compile_worm
@@ -41,6 +42,22 @@ def history(n: int) -> History:
 def moment(qpos: np.ndarray, n_segments: int, force: np.ndarray | None = None) -> Moment:
     still = np.zeros((n_segments, 3)) if force is None else force
     return Moment(0.0, qpos, np.linspace(0, 1, n_segments), still)
+
+
+def test_a_refusal_is_shown_until_something_is_requested_again() -> None:
+    def refuse() -> None:
+        raise ConfigError("that cannot be")
+
+    requests, met = Requests(), []
+    requests.add(refuse)
+    requests.add(met.append, 1)
+    requests.meet()
+    assert (requests.notice, met) == ("that cannot be", [1])
+    requests.meet()
+    assert requests.notice == "that cannot be"
+    requests.add(met.append, 2)
+    requests.meet()
+    assert (requests.notice, met) == ("", [1, 2])
 
 
 @pytest.mark.parametrize("preset", ["riddle2023-rods", "riddle2023"])

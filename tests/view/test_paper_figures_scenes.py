@@ -84,6 +84,16 @@ def test_marks_lie_on_what_was_rendered() -> None:
     assert max(share_of_grey(-9), share_of_grey(9)) < 0.3, "beside them"
 
 
+@needs_gl
+def test_on_a_slope_the_places_of_the_worm_span_its_pixels() -> None:
+    config = load_config("riddle2023-rods", {"arena.slope_deg": 30})
+    still = render_still(config, ISOMETRIC_DEG, (800, 600))
+    places = still.places(rest_posture(config).strands_m).reshape(-1, 2)
+    rows, columns = np.nonzero(still.pixels.min(axis=-1) < 240)
+    for drawn, found in zip((columns, rows), places.T, strict=True):
+        assert [found.min(), found.max()] == pytest.approx([drawn.min(), drawn.max()], abs=10.0)
+
+
 @pytest.mark.slow
 @needs_gl
 def test_figures_4_and_8_are_rendered(rods_run: Run, tmp_path: Path) -> None:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import csv
 import inspect
 import json
 import platform
+import re
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import redirect_stdout
@@ -22,6 +24,9 @@ _Json = Annotated[bool, typer.Option("--json", help=_HELP)]
 _OPTION = inspect.Parameter("as_json", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=_Json)
 _documents: ContextVar[list[Any] | None] = ContextVar("_documents", default=None)
 """What a command has given so far: one document or none yet; None without --json."""
+
+# As Python writes numbers. A digest or a name such as 12e4 or 007 is none, so it stays text.
+_NUMBER = re.compile(r"-?((0|[1-9]\d*)(\.\d+)?(e[+-]\d+)?|nan|inf)|")
 
 
 def with_json(command: Callable[..., None]) -> Callable[..., None]:
@@ -99,15 +104,27 @@ def records(paths: Sequence[Path]) -> dict[str, Any]:
 
     A table is a list of rows. One that has a JSON file of its name beside it is part of that file.
     """
-    import pandas
-
     from annelid.textfiles import read_json
 
     tables = (path for path in paths if path.suffix == ".csv" and path.with_suffix(".json") not in paths)
     found = {path.name: read_json(path) for path in paths if path.suffix == ".json"}
-    # Only an empty cell is None.
-    empty = {"keep_default_na": False, "na_values": ["", "nan"]}
-    return found | {path.name: pandas.read_csv(path, **empty).to_dict("records") for path in tables}
+    return found | {path.name: _rows(path) for path in tables}
+
+
+def _rows(path: Path) -> list[dict[str, Any]]:
+    with path.open(newline="", encoding="utf-8") as file:
+        header, *rows = csv.reader(file)
+    columns = map(_values, zip(*rows, strict=True))
+    return [dict(zip(header, row, strict=True)) for row in zip(*columns, strict=True)]
+
+
+def _values(cells: tuple[str, ...]) -> list[Any]:
+    """Reads a column: truths or numbers where all cells are, else texts; an empty cell is None."""
+    if all(cell in ("", "True", "False") for cell in cells):
+        return [cell == "True" if cell else None for cell in cells]
+    if all(map(_NUMBER.fullmatch, cells)):
+        return [None if not cell else int(cell) if cell.lstrip("-").isdigit() else float(cell) for cell in cells]
+    return [cell or None for cell in cells]
 
 
 def _strict(value: Any) -> Any:

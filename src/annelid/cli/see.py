@@ -268,6 +268,8 @@ def export_command(
     from annelid.simulation.lock import LOCK_NAME
     from annelid.simulation.runfile import open_run
 
+    if to in ("gif", "mp4") and to not in FORMATS:
+        raise RunFileError(f"unknown format '{to}': a video is drawn by annelid draw RUN --video FILE.{to}")
     kind = FORMATS.find(to)
     given = {"--signals": signals, "--every": every, "--from-time": from_time, "--to-time": to_time}
     for option, value in given.items():

@@ -176,10 +176,18 @@ class ProgramController(OpenLoopController[Program]):
     """Contracts segments at times that are given beforehand.
 
     Raises:
-        ConfigError: Muscles that are neither one nor two per segment.
+        ConfigError: Muscles that are neither one nor two per segment, or a contraction of a segment that the
+            worm does not have.
     """
 
     name = "program of contractions"
+
+    def __init__(self, pattern: Program, n_segments: int, n_muscles: int) -> None:
+        """Builds the controller from the same as `OpenLoopController`."""
+        last = max((contraction.segment for contraction in pattern.contractions), default=0)
+        if last > n_segments:
+            raise ConfigError(f"a contraction is of segment {last}, but the worm has segments 1 .. {n_segments}")
+        super().__init__(pattern, n_segments, n_muscles)
 
     def activation(self, time_s: ArrayLike) -> Array:
         """Returns the activation at times.

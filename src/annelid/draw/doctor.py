@@ -20,6 +20,7 @@ from annelid.errors import RenderingUnavailable
 
 _PACKAGES = ("numpy", "pydantic", "xarray", "h5netcdf", "h5py", "matplotlib", "imageio", "typer", "rich")
 _DEVELOPERS_EXTRAS = ("test", "dev")
+_BACK_ENDS = {"egl", "osmesa", "glfw", "glx", "wgl", "cgl"}  # other values of MUJOCO_GL are not printed
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +50,7 @@ def examine() -> Iterator[Finding]:
     machine = f"{platform.system()} {platform.release()} {platform.machine()}, {os.cpu_count()} cores"
     yield Finding("python", True, f"{platform.python_version()} on {machine}")
     yield _engine()
+    yield _package("mujoco-core", REMEDY)
     yield from (_package(package, f"pip install {package}") for package in _PACKAGES)
     yield from _back_ends()
     yield _ffmpeg()
@@ -82,11 +84,13 @@ def _back_ends() -> Iterator[Finding]:
         return
     for backend in tried:
         drawn = works(backend)
-        yield Finding(f"OpenGL {backend}", drawn, "draws" if drawn else "does not work here", optional=True)
+        name = backend if backend in _BACK_ENDS else "of MUJOCO_GL"
+        yield Finding(f"OpenGL {name}", drawn, "draws" if drawn else "does not work here", optional=True)
     try:
         yield Finding("frames and videos", True, f"drawn with {find_backend()}")
     except RenderingUnavailable as error:
-        yield Finding("frames and videos", False, str(error))
+        detail = str(error) if _BACK_ENDS.issuperset(tried) else f"MUJOCO_GL names no back-end: {UNSET}"
+        yield Finding("frames and videos", False, detail)
 
 
 def _ffmpeg() -> Finding:

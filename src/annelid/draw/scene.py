@@ -182,6 +182,7 @@ class Still:
     target_m: Array  # point that the camera looks at, (3,)
     angles_deg: tuple[float, float]  # azimuth and elevation of the line of sight
     distance_m: float  # from the camera to the point that it looks at
+    upright: Array  # the rotation from the model's axes to upright ones, (3, 3)
 
     def places(self, points_m: ArrayLike) -> Array:
         """Finds the pixels at which points, m, ``(..., 3)``, appear.
@@ -190,7 +191,7 @@ class Still:
             Columns and rows, counted from the picture's upper left corner, shape ``(..., 2)``.
         """
         height, width = self.pixels.shape[:2]
-        offsets = np.asarray(points_m, dtype=float) - self.target_m
+        offsets = (np.asarray(points_m, dtype=float) - self.target_m) @ self.upright.T
         shares = picture_points(offsets, *self.angles_deg, self.distance_m, width / height)
         return shares * [width, height] - 0.5
 
@@ -229,7 +230,7 @@ def render_still(
     reach = float(np.linalg.norm(points - target, axis=1).max())
     set_fog(model, distance - reach, distance + PALE * reach)
     with _Scene(worm, size, angles_deg, distance, fine=True, words=False) as scene:
-        return Still(scene._draw(drawn, activation, target), target, angles_deg, distance)
+        return Still(scene._draw(drawn, activation, target), target, angles_deg, distance, worm.upright)
 
 
 def postures_of(run: Run, n_coordinates: int) -> NDArray[np.floating]:

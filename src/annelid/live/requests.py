@@ -13,7 +13,7 @@ class Requests:
     """Calls that are requested from any thread.
 
     Attributes:
-        notice: The sentence in which the last call failed, or an empty one.
+        notice: The sentence in which one of the calls that were last made failed, or an empty one.
     """
 
     def __init__(self) -> None:
@@ -30,9 +30,10 @@ class Requests:
         """Makes the calls."""
         with self._lock:
             calls, self._calls = self._calls, {}
+        if calls:
+            self.notice = ""
         for call, arguments in calls.values():
             try:
                 call(*arguments)
-                self.notice = ""
             except AnnelidError as error:
                 self.notice = str(error)

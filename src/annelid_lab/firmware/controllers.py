@@ -53,20 +53,20 @@ def controller_firmware(controller: Controller, name: str = "controller", *, rea
     Raises:
         ConfigError: The controller cannot be written as C, or a number is too large for the type.
     """
-    circuit = _circuit_of(controller)
-    if circuit is not controller:
+    if isinstance(controller, TurningController):
         raise ConfigError(
             "turning is not written as C: leave out the section [turning], and scale the activation of the two sides "
             "in your own program"
         )
+    circuit = _circuit_of(controller)
     if circuit.table.functions:
         place, _ = circuit.table.functions[0]
         name = list(circuit.circuit.network.inputs)[place]
         raise ConfigError(f"input {shown(name)} is set by a function of Python, which is not written as C")
-    controller.reset(0)
+    circuit.reset(0)
     start, senses = circuit.network_state.copy(), circuit.senses
     vectors = _controller_vectors(circuit)
-    controller.reset(0)
+    circuit.reset(0)
     network, n_muscles = circuit.circuit.network, circuit.n_segments * circuit.muscles_per_segment
     writer = Writer(network, circuit.stepper, start, real, name, vectors, circuit)
     firmware = writer.firmware("activation", n_muscles)

@@ -68,7 +68,8 @@ def drive(
         watchdog: Periods without an answer after which the loop stops.
         limits: On what is sent to a robot.
         wiring: Of a robot of servos.
-        controller: Instead of the configured one, as in `annelid.simulate`; not beside firmware.
+        controller: Instead of the configured one, as in `annelid.simulate`; not beside firmware. What a robot sends are
+            its ``senses``, names in `annelid.control.SENSED`: lengthening alone if it has none.
         progress: As in `annelid.simulate`.
         overwrite: Allow a folder that is not empty.
         clock: Time that never goes back, s.
@@ -95,7 +96,7 @@ def drive(
             f"for example {1.0 / timestep_s / min(max(n_steps, 1), MOST_STEPS):g} Hz"
         )
     body = build_plant(config)
-    interface = _interface(config, body)
+    interface = _interface(config, body, controller)
     pace = Pace(1.0 / rate_hz, clock, sleep)
     sensation = body.reset(0)
     rest_m = lengthening_m(sensation.rest_stretch_m, 0.0 * sensation.rest_stretch_m)
@@ -125,8 +126,8 @@ def drive(
     return Driven(run, report | {part.partner.who: part.partner.to_dict() for part in parts})
 
 
-def _interface(config: RunConfig, body: Plant) -> Interface:
-    """What passes between body and controller: what the configured controller senses, and activation."""
-    configured = build_controller(config.model_copy(update={"trial": None}), body)
-    senses = getattr(configured, "senses", ("lengthening_m",))
+def _interface(config: RunConfig, body: Plant, controller: object | None) -> Interface:
+    """What passes between body and controller: what the controller senses, the configured one if None; activation."""
+    own = build_controller(config.model_copy(update={"trial": None}), body) if controller is None else controller
+    senses = getattr(own, "senses", ("lengthening_m",))
     return Interface(tuple(senses), body.n_segments, body.n_muscles, round(1e6 * config.clock.control_timestep_s))

@@ -48,7 +48,8 @@ def paper_command(
 
     Writes report.html, one file with all pictures to read and to send, and report.md beside its figures.
     The whole takes about an hour on two cores, --quick about 6 min. Every run is kept in report/runs, so
-    a second call takes seconds, and a killed one goes on where it was.
+    a second call runs no worm again, and a killed one goes on where it was. Without OpenGL the report
+    leaves out figures 4 and 8, and says so.
 
     \b
     annelid study paper                                      the whole, into the folder report
@@ -148,8 +149,8 @@ def robustness_command(
     The designed sample varies sensor noise, friction, physics step, number of segments and stiffness. Every worm is
     driven by four controllers: sns (the paper's, with the preset's tolerance), sns-tolerance (the paper's, with the
     tolerance that its body needs), sns-robust, and timed (a wave without sensing). Writes robustness.json and
-    robustness.md, and keeps runs: a second call goes on where the first was stopped, and one with more points computes
-    only these. All 300 points take about 25 hours of one core for each controller.
+    robustness.md, of all runs that the folder keeps: a second call goes on where the first was stopped, and one with
+    more points computes only these. All 300 points take about 25 hours of one core for each controller.
 
     \b
     annelid study robustness --points 10 -o draft     the first ten points

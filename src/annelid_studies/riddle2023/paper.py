@@ -61,7 +61,8 @@ def reproduce(
         progress: Called as the work goes on.
 
     Returns:
-        The report, whose pictures are drawn: without those that are rendered where there is no OpenGL.
+        The report, whose pictures are drawn: where there is no OpenGL, without those that are rendered, and its summary
+        says so.
 
     Raises:
         ConfigError: An examination has no such name.
@@ -80,22 +81,29 @@ def reproduce(
     examined = [Examined(asked, asked.examine(store, effort)) for asked in chosen]
     figures: list[Figure] = []
     main, claims, judging = store.run(MAIN), list[Claim](), list[str]()
+    summary = _summary(main)
     if only is None:
         series = {f"{CHAIN}, first helix": walked_elongation(store[MAIN], first_helix=True).tolist()}
         series |= {f"{label}, mean of six": walked_elongation(store[variants[label]]).tolist() for label in _QUICK}
         pictures = folder / "figures"
         pictures.mkdir(parents=True, exist_ok=True)
-        drawn = [number for number in FIGURES if number not in RENDERED or renderings.rendering_works()]
+        drawn = list(FIGURES)
+        if not renderings.rendering_works():
+            drawn = [number for number in FIGURES if number not in RENDERED]
+            left_out = " and ".join(map(str, RENDERED))
+            summary.append(f"Figures {left_out} need OpenGL, which this machine lacks (`annelid doctor`).")
         for i, number in enumerate(drawn):
             if progress is not None:
                 progress("drawing", i, len(drawn), i / len(drawn))
             stem, title = pictures / f"figure_{number}", texts("figures/figures.toml")[str(number)]["title"]
             figures.append(Figure(number, title, stem.with_suffix(".png"), FIGURES[number](main, series, stem)))
+        if progress is not None:
+            progress("drawing", len(drawn), len(drawn), 1.0)
         evidence = Evidence(store, effort, {one.examination.name: one.findings for one in examined})
         claims, judging = paper_claims(evidence), rule(evidence)
     return Report(
         effort=effort,
-        summary=_summary(main),
+        summary=summary,
         main_table=_beside_the_paper(store[MAIN]),
         variants=_variants_table({label: store[case] for label, case in variants.items()}),
         figures=figures,

@@ -20,8 +20,10 @@ from wire_line import FakeClock, Line
 
 import annelid
 from annelid.cli import app
+from annelid.control import SENSED
 from annelid.errors import ConfigError, SimulationStopped
 from annelid.nervous import peristalsis_network
+from annelid.protocols import Sensation
 from annelid.simulation.runfile import open_run
 from annelid_lab.firmware import controller_firmware
 from annelid_lab.loop import Interface, Limits, Peer, PseudoRobot, Role, UdpLink, Wiring, drive, open_link
@@ -287,6 +289,35 @@ def test_what_the_firmware_says_is_what_the_robot_does(tmp_path: Path) -> None:
     assert len(command) == 26
     assert command[::2] == pytest.approx(expected, abs=1e-6)
     assert driven.report["robot"]["lost"] == driven.report["firmware"]["lost"] == 0
+
+
+def test_a_robot_sends_what_the_given_controller_senses(tmp_path: Path) -> None:
+    """Whatever the configured one senses: the two sides agree on it when they say hello."""
+    clock = FakeClock()
+    interface = Interface(("lengthening_m", "touch_N"), 3, 3, 1000)
+    robot = Line(Peer(Role.BODY, interface, lambda activation, n: np.repeat([0.0, 2.0], [3, 12])), clock)
+    felt: list[float] = []
+
+    class Feeler:
+        name = "feeler"
+        senses = ("lengthening_m", "touch_N")
+
+        def reset(self, seed: int) -> None:
+            """Has no state."""
+
+        def step(self, sensation: Sensation) -> np.ndarray:
+            felt.append(float(np.max(SENSED["touch_N"].read(sensation))))
+            return np.zeros(3)
+
+    config = annelid.load_config("riddle2023-rods", {"duration_s": 0.2})
+    driven = drive(
+        config, tmp_path, robot=robot, controller=Feeler(), rate_hz=25.0, watchdog=20, clock=clock, sleep=clock.sleep
+    )
+    assert driven.run.status == "complete", driven.run.message
+    assert max(felt) == 2.0
+    servos = PseudoRobot(3, 3)
+    with pytest.raises(ConfigError, match="this controller needs touch_N, which a robot of servos does not sense"):
+        drive(config, tmp_path / "servos", servos=servos, controller=Feeler())
 
 
 def test_a_robot_and_firmware_over_udp(tmp_path: Path) -> None:

@@ -1,0 +1,58 @@
+"""The tables of studies on a terminal of 80 columns: no number and no word of a head is broken."""
+
+from __future__ import annotations
+
+import pytest
+from rich.console import Console
+from rich.table import Table
+
+from annelid_studies import pipes, riddle2025, turning
+
+NAN = float("nan")
+TABLES = {
+    "riddle2025": riddle2025.comparison_table(
+        [
+            riddle2025.Reading(*point, *of, 3, 3, 0.123456, "taken out", "annelid run x")
+            for point in riddle2025.points()
+            for of in (
+                (3, 0.0312345, 0.0298765, 0.0333333),
+                (3, -0.0012345, -0.0023456, -0.0001234),
+                (1, 0.03, NAN, NAN),
+            )
+        ]
+    ),
+    "pipes": pipes.pipes_table(
+        [
+            pipes.Reading(*trial[:3], passed, 0.0312345, 1.234567, passed, work, slip, "annelid run x")
+            for trial in pipes.trials()
+            for passed, work, slip in ((True, 12345.678, 12.3456), (False, None, None))
+        ]
+    ),
+    "turning": turning.turning_table(
+        [
+            turning.Reading(gait.name, -0.9, wave, 2.6251, 0.0312345, -12.3456, -0.5, radius, -123.4, "annelid run x")
+            for gait in turning.GAITS
+            for wave, radius in ((True, 12345.678), (False, float("inf")), (None, NAN))
+        ]
+    ),
+}
+
+
+@pytest.mark.parametrize("study", TABLES)
+def test_no_cell_breaks_at_80_columns(study: str) -> None:
+    table: Table = TABLES[study]
+    console = Console(width=80, color_system=None)
+    with console.capture() as capture:
+        console.print(table)
+    lines = capture.get().splitlines()
+    assert max(map(len, lines)) <= 80
+    assert len(table.columns) <= 8
+    shown = {" ".join(cell.split()) for line in lines for cell in line.replace("┃", "│").split("│")}
+    words = {word for cell in shown for word in cell.split()}
+    for column in table.columns:
+        assert set(str(column.header).split()) <= words
+        for cell in map(str, column.cells):
+            if column.justify == "right":
+                assert cell in shown
+            else:
+                assert set(cell.split()) <= words

@@ -3,7 +3,7 @@
     python examples/sensitivity.py [folder]
 
 Each parameter is raised and lowered by a tenth; the worms run in processes. Read it beside the error of the numerics:
-period and elongation of this preset hold to 1 or 2 % (docs/speed.md).
+period and elongation of this preset hold to 1 or 2 % (docs/evidence/speed.md).
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ GAITS = Path(__file__).parent.parent / "docs" / "results" / "gaits.csv"
 CRAWLERS = ("crawler", "crawler-timed", "crawler-servo")
 FINER = ("half_step", "quarter_step", "element_more", "elements_more")
 UNTUNED = "riddle2025-muscles"
-"""At the edge of its order: it walks with five of eight frictions (docs/speed_of_travel.md)."""
+"""At the edge of its order: it walks with five of eight frictions (docs/evidence/speed_of_travel.md)."""
 CMMWORM_M_PER_S = 0.258 / 60.0
 
 

@@ -95,7 +95,7 @@ def converged(tmp_path_factory: pytest.TempPathFactory) -> Summary:
 def test_a_level_is_as_near_to_the_converged_run_as_its_page_says(
     level: str, within: float, converged: Summary, tmp_path: Path
 ) -> None:
-    """The table of docs/speed.md, at friction 1 with three segments."""
+    """The table of docs/evidence/speed.md, at friction 1 with three segments."""
     ours = summary(
         simulate(load_config("riddle2023-rods", {"duration_s": 8.0}, fidelity=level), tmp_path, progress=False)
     )

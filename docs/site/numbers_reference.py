@@ -9,7 +9,7 @@ INTRODUCTION = """# The numbers of a run
 
 This page lists all numbers of `annelid.summary(run)`. A number has the same name in Python, in `annelid show --json`,
 in a sweep and in tables as CSV. `annelid list numbers` prints the same list. A number that cannot be computed is None
-(null), in a sweep NaN. [Gait](../gait.md) defines the locomotion metrics and the energy balance.
+(null), in a sweep NaN. [Gait](../evidence/gait.md) defines the locomotion metrics and the energy balance.
 """
 
 

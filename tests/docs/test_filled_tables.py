@@ -26,22 +26,22 @@ WAITING: tuple[str, ...] = ()
 """Result files that do not exist yet: their tables have the numbers of earlier runs."""
 
 EXCEPTIONS = {
-    ("docs/challenge.md", "entrant"): "what was searched, not results",
+    ("docs/evidence/challenge.md", "entrant"): "what was searched, not results",
     ("docs/environments.md", "numbers"): "spaces of the environment, not results: tests/environments compares them",
     ("docs/explanation/equations.md", "symbol"): "values of presets, which test_equations compares",
     ("docs/explanation/equations.md", "conductance"): "the same",
     ("docs/explanation/equations.md", "equation"): "numbers of equations",
-    ("docs/gait.md", "number"): "definitions, not results",
+    ("docs/evidence/gait.md", "number"): "definitions, not results",
     ("docs/how_to/install.md", "extra"): "sizes of other packages",
-    ("docs/material.md", "source"): "published values",
-    ("docs/paper.md", "quantity"): "the whole page is written by `annelid paper -o report --claims docs/paper.md`",
-    ("docs/paper.md", "#"): "the same",
+    ("docs/evidence/material.md", "source"): "published values",
+    ("docs/evidence/paper.md", "quantity"): "the whole page is written by `annelid paper -o report --claims docs/evidence/paper.md`",
+    ("docs/evidence/paper.md", "#"): "the same",
     ("docs/troubleshooting.md", "code"): "exit codes, not results",
     ("docs/presets.md", "field"): "fields of a preset, which tests/test_presets.py compares with its sources",
-    ("docs/validation.md", "formulation"): "printed by `pytest -m slow -s tests/body/test_ring_down.py`",
-    ("docs/validation.md", "step (ms)"): "the same",
+    ("docs/evidence/validation.md", "formulation"): "printed by `pytest -m slow -s tests/body/test_ring_down.py`",
+    ("docs/evidence/validation.md", "step (ms)"): "the same",
     ("docs/wire.md", "bytes"): "the protocol, not results",
-    ("docs/weak_middle.md", "cause"): "printed by `annelid study weak-middle`, which writes it into no file",
+    ("docs/evidence/weak_middle.md", "cause"): "printed by `annelid study weak-middle`, which writes it into no file",
 }
 """Tables of numbers without a result file, by page and first head, and why."""
 
@@ -148,7 +148,7 @@ def test_every_result_file_is_shown() -> None:
         for file in found["files"].split(", ")
     }
     there = {path.relative_to(DOCS).as_posix() for path in (DOCS / "results").iterdir() if path.suffix != ".toml"}
-    assert {file for file in there - named if not any(f"]({file})" in page for page in PAGES.values())} == set()
+    assert {file for file in there - named if not any(re.search(rf"\]\((?:\.\./)?{file}\)", page) for page in PAGES.values())} == set()
 
 
 def test_numbers_are_of_worms_as_they_are() -> None:

@@ -16,7 +16,7 @@ from fill_tables import MARKED
 from gallery import cases, main, make, makers, pictures
 
 GALLERY = "docs/gallery.md"
-SHOWN = re.compile(r"""(?:!\[[^\]]*\]\(|(?:src|poster)=")(?:docs/)?images/([^)"]+)[)"]""")
+SHOWN = re.compile(r"""(?:!\[[^\]]*\]\(|(?:src|poster)=")(?:docs/|\.\./)?images/([^)"]+)[)"]""")
 
 
 def words_of(command: str) -> Command:

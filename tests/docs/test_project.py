@@ -82,7 +82,7 @@ def test_the_recipe_has_the_packages_dependencies() -> None:
 def test_the_article_says_what_the_pages_say() -> None:
     article = read("paper/paper.md")
     assert filled(article) == article, "run: python docs/site/fill_tables.py"
-    (tally,) = re.findall(r"^Verdicts on the paper's .+$", PAGES["docs/paper.md"], re.MULTILINE)
+    (tally,) = re.findall(r"^Verdicts on the paper's .+$", PAGES["docs/evidence/paper.md"], re.MULTILINE)
     (sentence,) = re.findall(r"Of \d+ claims, [^.]+\.", " ".join(article.split()))
     assert re.findall(r"\d+", sentence) == re.findall(r"\d+", tally)
     header, text = article.split("---\n", 2)[1:]

@@ -62,10 +62,10 @@ def test_hands_its_options_on(annelid: Command, asked: Asked) -> None:
 
 def test_writes_the_claims_where_they_are_wanted(annelid: Command, asked: Asked) -> None:
     Path("docs").mkdir()
-    Path("docs/paper.md").write_text("as it was")
-    done = annelid("paper", "--claims", "docs/paper.md", "-q")
-    assert done.out.split()[-1] == "docs/paper.md"
-    assert "| 1 | It walks | **holds** | 2.635 s | 2.629 s |" in Path("docs/paper.md").read_text("utf-8")
+    Path("docs/evidence/paper.md").write_text("as it was")
+    done = annelid("paper", "--claims", "docs/evidence/paper.md", "-q")
+    assert done.out.split()[-1] == "docs/evidence/paper.md"
+    assert "| 1 | It walks | **holds** | 2.635 s | 2.629 s |" in Path("docs/evidence/paper.md").read_text("utf-8")
 
 
 @pytest.mark.parametrize(

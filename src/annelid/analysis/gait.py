@@ -1,7 +1,7 @@
 """Locomotion metrics: speed, stride, slip, cost of transport and turning.
 
 Everything is computed over complete cycles behind the first one, from one contraction of segment 1 to a later one.
-docs/gait.md has the definitions with their formulae and sources.
+docs/evidence/gait.md has the definitions with their formulae and sources.
 """
 
 from __future__ import annotations

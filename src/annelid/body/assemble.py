@@ -23,7 +23,7 @@ from annelid.config import RunConfig
 from annelid.errors import ConfigError
 
 MOST_ORDERED_BODIES = 8192
-"""Above this the engine's solver does not order its unknowns (docs/upstream/sparse_ordering.md)."""
+"""Above this the engine's solver does not order its unknowns (docs/evidence/sparse_ordering.md)."""
 _SHORT = "lengthen body.mesh.rear_overhang_m and body.mesh.radius_m, or lessen body.mesh.elements_per_side"
 _REMEDIES = {
     "mass and inertia of moving bodies": "a part is too light, so raise body.strands.linear_density_kg_per_m, "

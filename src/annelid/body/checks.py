@@ -109,7 +109,7 @@ def tolerance_findings(
         return
     shape, tolerance = rhombus_of(body), config.sensor.tolerance_m
     most = shape.longest_m - shape.along_m
-    # Muscles that lag let segments pass each other at more than half of that (docs/robust.md).
+    # Muscles that lag let segments pass each other at more than half of that (docs/evidence/robust.md).
     share = 0.5 if lags else 0.25
     low, high = window or (0.02 * most, share * most)
     instead = f"set about {(low + high) / 2 if window else 0.48 * high:.2g}"

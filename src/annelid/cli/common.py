@@ -78,7 +78,7 @@ FidelityLevel = Annotated[
     typer.Option(
         "--fidelity",
         metavar="LEVEL",
-        help="How finely a 3D worm of rods with rigid crossings is resolved: accurate, fast or preview (docs/speed.md"
+        help="How finely a 3D worm of rods with rigid crossings is resolved: accurate, fast or preview (docs/evidence/speed.md"
         " has their errors)  [default: as the preset has it]",
     ),
 ]

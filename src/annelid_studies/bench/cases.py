@@ -30,7 +30,7 @@ CHAIN_S, SEGMENTS_S = 0.05, 2.0
 """Durations of the runs on the lines of segments, s: fifty steps of the chain, two hundred of rods."""
 
 _STEPS_MS = {"full": (1, 2, 5, 10, 20, 40), "quick": (5, 20)}
-# 47 segments are beyond the limit of the engine (docs/upstream/sparse_ordering.md).
+# 47 segments are beyond the limit of the engine (docs/evidence/sparse_ordering.md).
 _SEGMENTS = {"full": (3, 6, 12, 24, 30), "quick": (3, 6, 12)}
 # Twelve segments of chain take seconds to compile and most of a second a step; both grow about with the cube of N.
 _CHAIN_SEGMENTS = {"full": (3, 6, 12), "quick": (3, 6)}

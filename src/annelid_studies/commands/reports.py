@@ -55,7 +55,7 @@ def paper_command(
     annelid study paper                                      the whole, into the folder report
     annelid study paper --quick -o draft                     the same claims from coarser maps
     annelid study paper --only pins --only friction          these examinations only
-    annelid study paper -o report --claims docs/paper.md     and the table of claims for the repository
+    annelid study paper -o report --claims docs/evidence/paper.md     and the table of claims for the repository
     """
     from annelid.output import with_suffix, write_text
     from annelid_studies.riddle2023.paper import reproduce
@@ -219,7 +219,7 @@ def challenge_command(
     Every entrant runs every task with the same draws, in the same body and blind to the draws. The tuned timed wave
     always runs too, as the reference. Writes runs.csv, one row per run; scores.csv, means with 95 % intervals by
     entrant and task; tasks.csv, one row per task; challenge.png and .svg. Runs are kept: a second call takes seconds,
-    and the same command continues an interrupted one. The whole takes a few hours on two cores; docs/challenge.md has
+    and the same command continues an interrupted one. The whole takes a few hours on two cores; docs/evidence/challenge.md has
     tasks, rules and results.
 
     \b

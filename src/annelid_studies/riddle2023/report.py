@@ -19,7 +19,7 @@ PAPER = "A Dynamic Simulation of a Compliant Worm Robot Amenable to Neural Contr
 MARKDOWN_NAME, HTML_NAME = "report.md", "report.html"
 LEADING = (4, 7, 9)
 """Numbers of the figures that stand first: the model, what it does, and its elongations beside the robot's."""
-CLAIMS_COMMAND = "annelid paper -o report --claims docs/paper.md"
+CLAIMS_COMMAND = "annelid paper -o report --claims docs/evidence/paper.md"
 """The command that regenerates the page of claims in the repository."""
 
 

@@ -1,7 +1,7 @@
 """The paper's network and the robust one under sensor signals that do not come from a body, from random states.
 
-Prints the two tables of docs/evidence/robust.md: how often the paper's network shows one wave 1-2-..-N all the same, and the
-robust network's periods relative to design. Takes about two minutes.
+Prints the two tables of docs/evidence/robust.md: how often the paper's network shows one wave 1-2-..-N all the same,
+and the robust network's periods relative to design. Takes about two minutes.
 
     python benchmarks/robust_network.py --csv docs/results/robust_network.csv
 """

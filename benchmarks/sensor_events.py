@@ -2,10 +2,10 @@
 
 Prints, for the paper's robot with rigid crossings, every switch of a stretch sensor and every contraction with the
 segments' lengthening, mm: as the preset is, with small and large tolerances, with stiff strands, and without the
-damping across the bend (docs/evidence/robust.md). Takes about two minutes. With ``--windows`` it measures, under a timed wave,
-what `annelid.plausibility.tolerance_window_m` estimates: how far neighbours lift a segment at rest, and the length at
-which the releasing and the next segment are equally long. With ``--walks`` it runs the paper's network with tolerances
-about the edges of the window.
+damping across the bend (docs/evidence/robust.md). Takes about two minutes. With ``--windows`` it measures, under a
+timed wave, what `annelid.plausibility.tolerance_window_m` estimates: how far neighbours lift a segment at rest, and
+the length at which the releasing and the next segment are equally long. With ``--walks`` it runs the paper's network
+with tolerances about the edges of the window.
 
     python benchmarks/sensor_events.py
     python benchmarks/sensor_events.py --windows --csv docs/results/tolerance_windows.csv

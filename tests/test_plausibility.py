@@ -134,7 +134,7 @@ STRANDS = "body.strands."
 MEASURED_WINDOWS = np.genfromtxt(
     Path(__file__).parents[1] / "docs" / "results" / "tolerance_windows.csv", delimiter=",", skip_header=1
 )[:, :5].tolist()
-"""Modulus, GPa, friction and damping time, s; lift by the neighbours and length in passing, mm (docs/evidence/robust.md)."""
+"""Modulus, GPa, friction and damping time, s; lift by the neighbours and length in passing, mm."""
 
 
 def of_rods(modulus_GPa: float, friction: float = 1.0, damping_s: float = 0.145, **more: Any) -> RunConfig:

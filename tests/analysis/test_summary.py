@@ -67,7 +67,11 @@ def test_json_has_every_number_and_reads_back_the_same() -> None:
 def test_every_number_is_declared_with_its_meaning_and_the_page_of_gaits_names_those_that_there_are() -> None:
     assert {field.name for field in fields(Summary)} == set(NUMBERS)
     assert [name for name, number in NUMBERS.items() if not number.meaning] == []
-    table = (Path(__file__).parents[2] / "docs" / "evidence" / "gait.md").read_text(encoding="utf-8").partition("\n## The energy")[0]
+    table = (
+        (Path(__file__).parents[2] / "docs" / "evidence" / "gait.md")
+        .read_text(encoding="utf-8")
+        .partition("\n## The energy")[0]
+    )
     rows = [line.split("|") for line in table.splitlines() if line.startswith("| `")]
     for _, names, _, units, _ in rows:
         told = [name.strip(" `") for name in names.split(",")]

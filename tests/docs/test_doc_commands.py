@@ -107,7 +107,7 @@ ELSEWHERE = {
     ("annelid", "run", "tune/best.toml"): "the file is what a search found",
     ("annelid", "run", "mine/calibrated.toml"): "the file is what a fit found",
     ("annelid", "draw", "course", "--time"): "its run is that of the page's example, which takes minutes",
-    ("annelid", "draw", "course", "--video", "course.mp4", "--camera", "course"): "docs/evidence/turning.md executes it",
+    ("annelid", "draw", "course", "--video", "course.mp4", "--camera", "course"): "evidence/turning.md executes it",
 }
 """Commands that are not executed here, and why."""
 

@@ -34,7 +34,7 @@ EXCEPTIONS = {
     ("docs/evidence/gait.md", "number"): "definitions, not results",
     ("docs/how_to/install.md", "extra"): "sizes of other packages",
     ("docs/evidence/material.md", "source"): "published values",
-    ("docs/evidence/paper.md", "quantity"): "the whole page is written by `annelid paper -o report --claims docs/evidence/paper.md`",
+    ("docs/evidence/paper.md", "quantity"): "the whole page is written by `annelid paper -o report --claims FILE.md`",
     ("docs/evidence/paper.md", "#"): "the same",
     ("docs/troubleshooting.md", "code"): "exit codes, not results",
     ("docs/presets.md", "field"): "fields of a preset, which tests/test_presets.py compares with its sources",
@@ -148,7 +148,11 @@ def test_every_result_file_is_shown() -> None:
         for file in found["files"].split(", ")
     }
     there = {path.relative_to(DOCS).as_posix() for path in (DOCS / "results").iterdir() if path.suffix != ".toml"}
-    assert {file for file in there - named if not any(re.search(rf"\]\((?:\.\./)?{file}\)", page) for page in PAGES.values())} == set()
+    assert {
+        file
+        for file in there - named
+        if not any(re.search(rf"\]\((?:\.\./)?{file}\)", page) for page in PAGES.values())
+    } == set()
 
 
 def test_numbers_are_of_worms_as_they_are() -> None:

@@ -61,7 +61,7 @@ def test_hands_its_options_on(annelid: Command, asked: Asked) -> None:
 
 
 def test_writes_the_claims_where_they_are_wanted(annelid: Command, asked: Asked) -> None:
-    Path("docs").mkdir()
+    Path("docs/evidence").mkdir(parents=True)
     Path("docs/evidence/paper.md").write_text("as it was")
     done = annelid("paper", "--claims", "docs/evidence/paper.md", "-q")
     assert done.out.split()[-1] == "docs/evidence/paper.md"

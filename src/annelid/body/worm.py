@@ -96,13 +96,13 @@ class WormBody(MeshBody):
     def tolerance_window_m(self, friction: float) -> tuple[float, float] | None:
         """Estimates between which tolerances of the stretch sensors the paper's controller walks in order, m.
 
-        Below, contracting neighbours lift a segment at rest out of its tolerance. Above, a segment that lets go is back
-        within it before the next has left it: all sensors say "at rest", and nothing contracts again. The middle of
-        both is the tolerance to set. Both lengths are fitted to the paper's robot of rods under a timed wave, with
+        Below, contracting neighbours lift a segment at rest out of its tolerance. Above, a segment that lets go is
+        back within it before the next has left it: all sensors say "at rest", and nothing contracts again. The middle
+        of both is the tolerance to set. Both lengths are fitted to the paper's robot of rods under a timed wave, with
         moduli of 0.3 to 2 GPa, friction of 0.05 to 1 and damping times of 0.05 to 0.36 s, within 7 and 4 mm, with
         muscles that lag behind their commands by the engine's times. Under the paper's network the worm walks with
-        three quarters of the lift and more (docs/evidence/robust.md). The stiffness enters as ``sqrt(EI / (k s^3))``, with the
-        springs' rate k and the side s of a rhombus: stiffer strands spread a contraction.
+        three quarters of the lift and more (docs/evidence/robust.md). The stiffness enters as ``sqrt(EI / (k s^3))``,
+        with the springs' rate k and the side s of a rhombus: stiffer strands spread a contraction.
 
         Args:
             friction: Coefficient of the ground.

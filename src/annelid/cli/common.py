@@ -78,8 +78,8 @@ FidelityLevel = Annotated[
     typer.Option(
         "--fidelity",
         metavar="LEVEL",
-        help="How finely a 3D worm of rods with rigid crossings is resolved: accurate, fast or preview (docs/evidence/speed.md"
-        " has their errors)  [default: as the preset has it]",
+        help="How finely a 3D worm of rods with rigid crossings is resolved: accurate, fast or preview"
+        " (docs/evidence/speed.md has their errors)  [default: as the preset has it]",
     ),
 ]
 ArenaName = Annotated[

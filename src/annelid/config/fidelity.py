@@ -1,7 +1,7 @@
 """Levels of fidelity: how finely the worm of rods is resolved in space and time, never which worm it is.
 
-Errors over mesh and time step come from the study ``docs/results/resolution.toml`` and stand in ``docs/evidence/speed.md``. The
-paper's own worm, a chain of capsules, is no level but the preset ``riddle2023``.
+Errors over mesh and time step come from the study ``docs/results/resolution.toml`` and stand in
+``docs/evidence/speed.md``. The paper's own worm, a chain of capsules, is no level but the preset ``riddle2023``.
 """
 
 from __future__ import annotations

@@ -3,8 +3,8 @@
 An actuator's work in a step is the mean of its tensions at both ends times the shortening between them; what dampers,
 contacts and motors take is the mean of their powers at both ends times the step. So all of it converges in proportion
 to the square of the step, also where power jumps up and decays slowly. What is left of the muscles' work when
-everything else is subtracted is what the integrator has taken (docs/evidence/gait.md). Forces are the engine's own: weight,
-constraints, dampers, springs, and actuators, which `discrete` takes at the end of the step to first order.
+everything else is subtracted is what the integrator has taken (docs/evidence/gait.md). Forces are the engine's own:
+weight, constraints, dampers, springs, and actuators, which `discrete` takes at the end of the step to first order.
 """
 
 from __future__ import annotations

@@ -219,8 +219,8 @@ def challenge_command(
     Every entrant runs every task with the same draws, in the same body and blind to the draws. The tuned timed wave
     always runs too, as the reference. Writes runs.csv, one row per run; scores.csv, means with 95 % intervals by
     entrant and task; tasks.csv, one row per task; challenge.png and .svg. Runs are kept: a second call takes seconds,
-    and the same command continues an interrupted one. The whole takes a few hours on two cores; docs/evidence/challenge.md has
-    tasks, rules and results.
+    and the same command continues an interrupted one. The whole takes a few hours on two cores;
+    docs/evidence/challenge.md has tasks, rules and results.
 
     \b
     annelid study challenge --quick                                   in minutes

@@ -112,10 +112,10 @@ class Check:
         return max(self.moved, key=self.largest, default=None)
 
     def cell(self, name: str) -> str:
-        """Says how far a number moves, for a table; empty where it was not compared."""
+        """Says how far a number moves, with ! if it is not resolved, for a table; empty where it was not compared."""
         if name not in self.moved:
             return ""
-        return percent(self.largest(name)) + ("\nnot resolved" if self.largest(name) > RESOLVED else "")
+        return percent(self.largest(name)) + (" !" if self.largest(name) > RESOLVED else "")
 
     def _named(self, name: str) -> str:
         return f"{NUMBERS[name].label} ({percent(self.largest(name))})"

@@ -21,7 +21,7 @@ import numpy as np
 import xarray as xr
 from rich.table import Table
 
-from annelid.analysis import NUMBERS, Number
+from annelid.analysis import NUMBERS, Number, three_digits
 from annelid.config import RunConfig, Study, Vary, field_paths, load_config, load_study, toml_value, unit_of
 from annelid.config.study import INSTEAD, MOST_RUNS
 from annelid.draw.figures.sweep import sweep_figure, worded
@@ -422,7 +422,7 @@ def results_table(sweep: Sweep) -> Table:
         order = [i for i in np.argsort(-columns[0], kind="stable").tolist() if np.isfinite(columns[0][i])]
         for rows in [order] if len(order) <= 2 * N_ENDS else [order[:N_ENDS], order[-N_ENDS:]]:
             for i in rows:
-                values = ("" if np.isnan(column[i]) else f"{column[i]:.4g}" for column in columns)
+                values = ("" if np.isnan(column[i]) else three_digits(float(column[i])) for column in columns)
                 table.add_row(str(i), *_varied(sweep, i), *values)
             table.add_section()
     return table

@@ -4,35 +4,34 @@ from __future__ import annotations
 
 from math import isnan
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from annelid.draw import UNKNOWN, canvas, framed_table, panel_title, save_both
+from annelid.analysis import three_digits
+from annelid.draw import UNKNOWN, aligned, canvas, panel_title, save_both
 from annelid.live import Curve, Plot
 from annelid_lab.logs.agreement import Agreement
 
-if TYPE_CHECKING:
-    from rich.table import Table
 
-
-def agreement_table(found: Agreement) -> Table:
+def agreement_table(found: Agreement) -> str:
     """Returns a run's agreement with a measured log, two lines for each signal: measured and simulated."""
-    periods = [UNKNOWN if isnan(one) else f"{one:.3f} s" for one in found.period_s]
-    caption = f"lag {found.lag_s:.3f} s, clock drift {100 * found.clock_drift:.2f} %"
-    table = framed_table("signal", "amplitude", "duty", "period", "rms error", "phase", "waveform", caption=caption)
-    table.columns[0].no_wrap = True
+    headings = ("signal", "", "amplitude", "duty", "period", "rms error", "share", "phase", "waveform")
+    rows: list[tuple[str, ...]] = [headings]
     for name, one in found.signals.items():
         scale, unit = (1e3, "mm") if one.unit == "m" else (1.0, one.unit)
-        share = UNKNOWN if isnan(one.relative) else f"{100 * one.relative:.0f} %"
-        table.add_row(
-            f"{name}\n{one.signal}",
-            "\n".join(f"{scale * size:.3g} {unit}" for size in one.amplitude),
-            "\n".join(f"{100 * high:.0f} %" for high in one.duty),
-            "\n".join(periods),
-            f"{scale * one.rms:.3g} {unit}\n{share}",
+        errors = (
+            f"{three_digits(scale * one.rms)} {unit}",
+            UNKNOWN if isnan(one.relative) else f"{100 * one.relative:.0f} %",
             UNKNOWN if isnan(one.phase) else f"{one.phase:+.2f}",
             UNKNOWN if isnan(one.waveform) else f"{one.waveform:.2f}",
         )
-    return table
+        both = zip((name, one.signal), ("measured", "simulated"), one.amplitude, one.duty, found.period_s, strict=True)
+        for label, which, size, high, period_s in both:
+            amplitude = f"{three_digits(scale * size)} {unit}"
+            period = UNKNOWN if isnan(period_s) else f"{three_digits(period_s)} s"
+            rows.append(
+                (label, which, amplitude, f"{100 * high:.0f} %", period, *(errors if which == "measured" else ()))
+            )
+    lag = f"lag {three_digits(found.lag_s)} s, clock drift {100 * found.clock_drift:.2f} %"
+    return f"{aligned(rows)}\n{lag}"
 
 
 def agreement_figure(found: Agreement, stem: Path) -> Path:

@@ -47,7 +47,6 @@ LONGEST = 45
 
 LONG_SENTENCES = (
     "docs/evidence/paper.md",
-    "docs/security.md",
     "docs/evidence/slip.md",
     "docs/evidence/validation.md",
 )

@@ -50,7 +50,6 @@ FOR_USERS = ("docs/index.md", "docs/start.md")
 
 LONG_SENTENCES = (
     "docs/evidence/paper.md",
-    "docs/security.md",
     "docs/evidence/slip.md",
     "docs/evidence/validation.md",
 )

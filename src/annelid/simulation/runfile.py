@@ -183,7 +183,11 @@ def _reading(file: Path) -> Iterator[None]:
             within = sorted(
                 found.parent for depth in ("*", "*/*") for found in file.parent.glob(f"{depth}/{FILE_NAME}")
             )
-            held = f"{len(within)} run{'s' * (len(within) > 1)}: name one of them, as {within[0]}" if within else f"no {FILE_NAME}"
+            held = (
+                f"{len(within)} run{'s' * (len(within) > 1)}: name one of them, as {within[0]}"
+                if within
+                else f"no {FILE_NAME}"
+            )
             hint = f": {file.parent} holds {held}" if file.parent.is_dir() else ""
             sentence = f"there is no run file {file}{hint}"
         elif not isinstance(error, OSError):

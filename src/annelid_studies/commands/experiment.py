@@ -87,7 +87,7 @@ def _words() -> Mapping[str, Mapping[str, str]]:
     return parse_toml((files("annelid_studies.commands") / name).read_text(encoding="utf-8"), name)
 
 
-_HALF_STEP = Annotated[bool, typer.Option("--half-step", help="Bodies move in steps half as long.")]
+_HALF_STEP = Annotated[bool, typer.Option("--half-step", help="Use half the physics step.")]
 STUDIES = (
     Study("speed", "crawling", "speed", {"gaits": (_gaits("riddle2025-muscles and crawler"), None)}),
     Study("gaits", "crawling", "gaits", {"gaits": (_gaits("those of the six-segment robot"), None)}),
@@ -125,13 +125,13 @@ def load_frame_command(
         typer.Option(
             min=0.0,
             max=20.0,
-            help="Friction of the cable, a number without unit: coefficient times its wrap angle in rad.",
+            help="Friction of the cable: its coefficient times its wrap angle in rad.",
         ),
     ] = 0.0,
     data: Annotated[
         Path | None,
         typer.Option(
-            help="Measured loop to compare with: CSV of mm, N.  [default: the authors' one, for a worm of its size]"
+            help="Measured loop to compare with: CSV of mm, N  [default: the authors' loop, for a worm of its size]"
         ),
     ] = None,
     quiet: Quiet = False,
@@ -139,14 +139,15 @@ def load_frame_command(
 ) -> None:
     """Close one ring by its cable and open it again.
 
-    The middle ring of a weightless worm is wound in slowly and let out. For a worm of the robot's size, the cable's
-    force is compared with what the authors measured on one segment. A few seconds. Writes load_frame.csv, .png and
-    .svg.
+    The cable winds in the middle ring of a weightless worm slowly, and lets it out again. For a worm of the robot's
+    size, the table compares its force with the authors' measurement on one segment. It takes a few seconds. Writes
+    load_frame.csv, .png and .svg.
 
     \b
     annelid study load-frame
-    annelid study load-frame mine.toml --diameter-share 0.5     which force halves the diameter of your worm?
-    annelid study load-frame --set body.strands.young_modulus_Pa=1e9 --set body.joints.dry_friction_Nm=0.01
+    annelid study load-frame mine.toml --diameter-share 0.5      the force that halves the diameter
+    annelid study load-frame --set body.strands.young_modulus_Pa=1e9
+    annelid study load-frame --set body.joints.dry_friction_Nm=0.01
     """
     from annelid.experiment import study_progress
     from annelid_lab import calibration as frame

@@ -114,7 +114,7 @@ def load_frame_command(
     ] = None,
     diameter_share: Annotated[
         float | None,
-        typer.Option(help="The same as a share of the ring, and so of its diameter: 0.5 halves it; below 0.8."),
+        typer.Option(help="The same as a share of the diameter, below 0.8: 0.5 halves it."),
     ] = None,
     speed: Annotated[
         float | None,
@@ -145,7 +145,7 @@ def load_frame_command(
 
     \b
     annelid study load-frame
-    annelid study load-frame mine.toml --diameter-share 0.5      the force that halves the diameter
+    annelid study load-frame mine.toml --diameter-share 0.5
     annelid study load-frame --set body.strands.young_modulus_Pa=1e9
     annelid study load-frame --set body.joints.dry_friction_Nm=0.01
     """

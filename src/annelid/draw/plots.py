@@ -9,7 +9,6 @@ import numpy as np
 
 from annelid.analysis.paper import published
 from annelid.analysis.rhythm import CONTRACTED, segment_activation, stretches
-from annelid.control.sns import NAME, paper_controller
 from annelid.draw.canvas import canvas, line_entries, line_looks, panel_title, plain, save
 from annelid.draw.figures import RUN_FIGURES
 from annelid.errors import RunFileError
@@ -186,9 +185,7 @@ def _name_level(axes: Axes, level: float, text: str) -> None:
 
 def _published_levels(run: Run) -> list[float]:
     """Where each segment's published elongation ends, cm: above the lowest length where it is peak to peak, or rest."""
-    # A controller from Python takes the place of the configured one, which the numbers are published for.
-    replaced = paper_controller(run.config.controller) and run.data.attrs.get("controller", NAME) != NAME
-    beside = {} if replaced else published(run.config)
+    beside = published(run.config, run.data.attrs.get("controller"))
     starts = {
         "elongation_first_helix_pp_m": run.data["stretch_length"].values[:, :, 0].min(axis=0),
         "elongation_mean_max_m": run.data["stretch_rest_length"].values.mean(axis=1),

@@ -186,6 +186,11 @@ REFUSED: dict[str, tuple[Change, dict[str, object], str]] = {
     "a clock that is too coarse": (lambda log: log.assign(t_ms=log["t_ms"] // 100 * 100), {}, "repeat the time"),
     "no such column": (lambda log: log.drop(columns="s3_mm"), {}, "no column 's3_mm': .*s1_mm"),
     "no time": (lambda log: log.drop(columns="t_ms"), {}, "no column 't_ms'"),
+    "a time without a unit": (
+        lambda log: log.rename(columns={"t_ms": "t"}),
+        {"time": "t"},
+        "_s, or write time_unit = .s",
+    ),
     "a column twice": (lambda log: log.rename(columns={"s3_mm": "s1_mm"}), {}, "two columns 's1_mm'"),
     "mostly gaps": (lambda log: with_cells(log, "s1_mm", slice(100, 800), np.nan), {}, "no number in 8. %"),
     "too short": (lambda log: log.iloc[:12], {}, "too short to compare"),
@@ -209,7 +214,9 @@ def test_a_sensor_that_never_changes_is_noted_and_the_others_are_compared(run: R
     assert found.signals["s1_mm"].waveform > 0.99
     assert np.isnan(found.signals["s3_mm"].waveform)
     assert json.loads(json.dumps(found.to_dict(), allow_nan=False))["signals"]["s3_mm"]["phase"] is None
-    assert agreement_table(found).row_count == 3
+    lines = agreement_table(found).splitlines()
+    assert [line.split("  ")[0] for line in lines[1:-1:2]] == list(found.signals), "a line measured, one simulated"
+    assert max(map(len, lines)) <= 80, "\n".join(lines)
 
 
 def test_another_period_is_noted_and_not_taken_for_drift(run: Run, tmp_path: Path) -> None:

@@ -83,8 +83,8 @@ FidelityLevel = Annotated[
     typer.Option(
         "--fidelity",
         metavar="LEVEL",
-        help="How finely a 3D worm of rods with rigid crossings is resolved: accurate, fast or preview"
-        " (docs/evidence/speed.md has their errors)  [default: as the preset has it]",
+        help="Resolution of a 3D worm of rods: accurate, fast or preview; docs/evidence/speed.md has their errors"
+        "  [default: the preset's]",
     ),
 ]
 ArenaName = Annotated[
@@ -93,8 +93,8 @@ ArenaName = Annotated[
         "--arena",
         metavar="ARENA|FILE.toml|FILE.xml",
         autocompletion=arenas_from,
-        help="Put the 3D worm elsewhere: a name of `annelid list arenas`, a TOML file, or a scene of your own as MJCF"
-        " [default: where the preset is]",
+        help="Where the 3D worm crawls: a name of `annelid list arenas`, a TOML file, or a scene as MJCF (.xml)"
+        "  [default: the preset's]",
     ),
 ]
 Jobs = Annotated[
@@ -104,8 +104,9 @@ SchedulerAddress = Annotated[
     str | None,
     typer.Option(
         metavar="ADDRESS",
-        help="Have a Dask scheduler's workers compute the runs: tcp://HOST:PORT, tls://HOST:PORT, or its scheduler"
-        " file (.json). It runs code as you: name only what you trust  [default: processes of this machine]",
+        help="Compute the runs on the workers of this Dask scheduler: tcp://HOST:PORT, tls://HOST:PORT, or its"
+        " scheduler file (.json). It can run code in your name, so you must trust it"
+        "  [default: processes of this machine]",
     ),
 ]
 Output = Annotated[Path, typer.Option("--output", "-o", help="Folder of the results and the runs.")]
@@ -206,7 +207,24 @@ def config_of(
             raise ConfigError(f"{option} {value}: {fitted}; next: {typed_command(RIGID_PRESET)}")
     if segments is not None:
         overrides |= {load_config(source).body.segments_field: segments}
-    return load_config(source, overrides, fidelity=fidelity, arena=arena)
+    config = load_config(source, overrides, fidelity=fidelity, arena=arena)
+    _say_unchanged(config, overrides, source, fidelity, arena)
+    return config
+
+
+def _say_unchanged(config: RunConfig, overrides: Mapping[str, Any], source: str, *options: str | None) -> None:
+    """Says which fields were set to the value that they have without it."""
+    from annelid.config import field_value, fields_of, load_config, toml_value, whole_path
+
+    if not overrides:
+        return
+    fidelity, arena = options
+    without = load_config(source, fidelity=fidelity, arena=arena)
+    for path in (whole_path(given, config.model_dump()) for given in overrides):
+        if path in fields_of(config) and path in fields_of(without):
+            value = field_value(config, path)
+            if value == field_value(without, path):
+                complain(f"note: {path} = {toml_value(value)} changes nothing: {source} has this value")
 
 
 def names_worm(source: str) -> bool:
@@ -278,11 +296,10 @@ def print_paths(paths: Iterable[Path]) -> None:
             typer.echo(path)
 
 
-def print_worm(config: RunConfig, ended: str = "complete", *, quiet: bool = False) -> None:
-    """Prints in a line which worm it is, and how its run ended, unless it is to be quiet."""
+def print_worm(config: RunConfig, *, quiet: bool = False) -> None:
+    """Prints in a line which worm it is, unless it is to be quiet."""
     if not quiet and not wants_json():
         size = f", {config.body.n_segments} segments, {config.duration_s:g} s"
-        size += "" if ended == "complete" else f", {ended.replace('_', ' ')}"
         # What a summary has in brackets is how long it takes to compute.
         what = f"{config.name}: {config.summary.partition(' (')[0]}".removesuffix(": ")
         typer.echo(shorten(what, WIDTH - len(size), placeholder=" ..") + size)

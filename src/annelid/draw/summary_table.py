@@ -11,7 +11,7 @@ from rich import box
 from rich.table import Table
 
 from annelid.analysis.comparison import LACKING, Comparison, relative_difference
-from annelid.analysis.numbers import UNKNOWN, Value
+from annelid.analysis.numbers import UNKNOWN, Value, three_digits
 from annelid.analysis.paper import (
     ELONGATION_WITHIN,
     FORMULATION,
@@ -125,7 +125,8 @@ def summary_table(
     headings = ["", "this run", MOVED, *(COMPARED if references(config) else ())]
     lines = [headings]
     for name, (label, ours, *beside) in _rows(numbers, config, everything=everything).items():
-        lines.append([label, ours, "" if moved is None else moved(name), *beside])
+        further = "" if moved is None or getattr(numbers, name, None) is None else moved(name)
+        lines.append([label, ours, further, *beside])
     return aligned(lines if moved is not None else [[*line[:2], *line[3:]] for line in lines])
 
 
@@ -339,14 +340,14 @@ def legend(config: RunConfig) -> str:
 
 def closing_sentence(numbers: Summary, config: RunConfig) -> str:
     """Says in a sentence what a run shows: how it stands to its references, or how its segments contract."""
-    if numbers.status == "stopped":
-        return ""
+    if numbers.status != "complete":
+        return f"{numbers.status.replace('_', ' ')} after {three_digits(numbers.duration_s or 0.0)} s"
     if not references(config):
         return _about_the_rhythm(numbers)
     preset, changed = changed_fields(config)
     if changed:
         return f"differs from {preset} in {listed(changed)}; references are of the unchanged worm"
-    if not stands_for_the_papers(config) or numbers.status != "complete":
+    if not stands_for_the_papers(config):
         return _about_the_rhythm(numbers)
     if config.body.has_rigid_crossings:
         return _about_rigid_crossings(numbers)

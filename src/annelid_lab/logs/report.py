@@ -12,24 +12,17 @@ from annelid_lab.logs.agreement import Agreement
 
 
 def agreement_table(found: Agreement) -> str:
-    """Returns a run's agreement with a measured log, two lines for each signal: measured and simulated."""
-    headings = ("signal", "", "amplitude", "duty", "period", "rms error", "share", "phase", "waveform")
-    rows: list[tuple[str, ...]] = [headings]
+    """Returns a run's agreement with a measured log, two lines for each signal: measured, and simulated below it."""
+    rows: list[tuple[str, ...]] = [("signal", "amplitude", "duty", "period", "rms error", "phase", "waveform")]
     for name, one in found.signals.items():
         scale, unit = (1e3, "mm") if one.unit == "m" else (1.0, one.unit)
-        errors = (
-            f"{three_digits(scale * one.rms)} {unit}",
-            UNKNOWN if isnan(one.relative) else f"{100 * one.relative:.0f} %",
-            UNKNOWN if isnan(one.phase) else f"{one.phase:+.2f}",
-            UNKNOWN if isnan(one.waveform) else f"{one.waveform:.2f}",
-        )
-        both = zip((name, one.signal), ("measured", "simulated"), one.amplitude, one.duty, found.period_s, strict=True)
-        for label, which, size, high, period_s in both:
-            amplitude = f"{three_digits(scale * size)} {unit}"
+        share = UNKNOWN if isnan(one.relative) else f"{100 * one.relative:.0f} %"
+        likeness = (f"{each:{form}}" for each, form in ((one.phase, "+.2f"), (one.waveform, ".2f")))
+        errors = (f"{three_digits(scale * one.rms)} {unit}", *(UNKNOWN if "nan" in each else each for each in likeness))
+        both = zip((name, one.signal), one.amplitude, one.duty, found.period_s, (errors, (share,)), strict=True)
+        for label, size, high, period_s, behind in both:
             period = UNKNOWN if isnan(period_s) else f"{three_digits(period_s)} s"
-            rows.append(
-                (label, which, amplitude, f"{100 * high:.0f} %", period, *(errors if which == "measured" else ()))
-            )
+            rows.append((label, f"{three_digits(scale * size)} {unit}", f"{100 * high:.0f} %", period, *behind))
     lag = f"lag {three_digits(found.lag_s)} s, clock drift {100 * found.clock_drift:.2f} %"
     return f"{aligned(rows)}\n{lag}"
 

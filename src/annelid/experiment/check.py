@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from concurrent.futures import Executor
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -14,11 +14,10 @@ import numpy as np
 from annelid.analysis import NUMBERS
 from annelid.config import RunConfig
 from annelid.errors import ConfigError, listed
-from annelid.experiment.case import Case
 from annelid.experiment.finer_runs import STEP, finer_steps, more_elements, run_with_variants
 from annelid.experiment.outcome import Outcome
 from annelid.experiment.progress import StudyProgress
-from annelid.experiment.store import Done, Store
+from annelid.experiment.store import Done
 from annelid.output import write_json
 from annelid.simulation.lock import locks
 from annelid.simulation.runfile import Run, open_run
@@ -119,13 +118,6 @@ class Check:
 
     def _named(self, name: str) -> str:
         return f"{NUMBERS[name].label} ({percent(self.largest(name))})"
-
-    @property
-    def brief(self) -> str:
-        """Says in a few words what keeps the run from being resolved: another order, or the number that moves most."""
-        if self.differences or self.worst is None:
-            return self.differences[0] if self.differences else ""
-        return f"{NUMBERS[self.worst].label} {percent(self.largest(self.worst))}"
 
     @property
     def sentence(self) -> str:
@@ -277,16 +269,3 @@ def check(
     found = compare(itself.outcome, dict(zip(finer, done, strict=True)), left_out)
     write_json(folder / f"{RUNS}.json", found.to_dict())
     return open_run(folder), found
-
-
-def check_runs(store: Store, cases: Sequence[Case]) -> list[Check]:
-    """Checks runs that a store has, by finer ones that it computes and keeps.
-
-    Raises:
-        ConfigError: Half of a step is no multiple of the control step.
-        KeyboardInterrupt: Finished runs are kept.
-    """
-    plans = [(case, *refinements(case.config)) for case in cases]
-    finer = [Case(case.preset, one.changes, case.config) for case, found, _ in plans for one in found]
-    done = iter(store.finish(finer, "finer runs"))
-    return [compare(store[case], {one: next(done) for one in found}, left_out) for case, found, left_out in plans]

@@ -221,7 +221,7 @@ def test_numbers_alone_may_be_kept_and_chosen(tmp_path: Path) -> None:
 
 
 @given(n=st.integers(0, 40), numbers=st.lists(st.integers(), unique=True, max_size=30).map(sorted))
-def test_runs_to_check_are_spread_from_the_first_to_the_last(n: int, numbers: list[int]) -> None:
+def test_items_are_picked_evenly_from_the_first_to_the_last(n: int, numbers: list[int]) -> None:
     chosen = spread_evenly(n, numbers)
     assert len(set(chosen)) == len(chosen) == min(n, len(numbers))
     places = [numbers.index(one) for one in chosen]

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from math import cos, degrees, hypot, pi, radians, tan
-from statistics import fmean
 
 from annelid.body.estimates import WALKS_FROM, rhombus_of, soft_constraint
 from annelid.body.mesh import MeshBody
@@ -94,11 +93,11 @@ def ground_findings(config: RunConfig, body: MeshBody) -> Iterator[Finding]:
     rise = arena.slope_rad * cos(radians(body.heading_deg))
     backward = rise > 1e-9 and arena.backward_friction is not None
     field, friction = ("backward_friction", arena.backward_friction) if backward else ("friction", arena.friction)
-    steepness, relative = tan(abs(arena.slope_rad)), fmean(body.relative_frictions)
-    if steepness >= relative * (friction or 0.0):
+    steepness = tan(abs(arena.slope_rad))
+    if steepness >= (friction or 0.0):
         problem = f"with arena.{field} = {friction:g} the worm slides down"
         slope_deg = round(degrees(arena.slope_rad), 9)
-        yield Finding("arena.slope_deg", slope_deg, problem, f"set arena.{field} above {steepness / relative:.2g}")
+        yield Finding("arena.slope_deg", slope_deg, problem, f"set arena.{field} above {steepness:.2g}")
 
 
 def tolerance_findings(

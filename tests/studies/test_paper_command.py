@@ -118,7 +118,7 @@ def test_ctrl_c_tells_how_to_go_on(
 
 
 def test_without_a_terminal_progress_is_a_line(annelid: Command, asked: Asked) -> None:
-    assert annelid("paper").err == "running worms: 1 of 2 runs\n"
+    assert annelid("paper").err == "running worms: 1 of 2 runs, 50%\n"
 
 
 class Clock:

@@ -83,7 +83,19 @@ class Plan:
         fixed = flattened(self.study.set)
         seeds = [{"seed": seed} for seed in self.levels[REPEAT]] if REPEAT in self.levels else [{}]
         varied = [dict(zip(self.fields, sample, strict=True)) for sample in self.samples]
-        return tuple((values, Case(self.study.preset, fixed | values | seed)) for values in varied for seed in seeds)
+        follows = dict(zip(self.fields, (vary.follow for vary in self.study.vary), strict=True))
+        return tuple(
+            (values, Case(self.study.preset, fixed | values | _following(follows, values) | seed))
+            for values in varied
+            for seed in seeds
+        )
+
+
+def _following(follows: Mapping[str, Mapping[str, float]], values: Mapping[str, Any]) -> dict[str, float]:
+    """Values of the fields that keep a ratio to a varied one, by dotted path."""
+    return {
+        path: float(f"{ratio * values[field]:.6g}") for field, paths in follows.items() for path, ratio in paths.items()
+    }
 
 
 @dataclass(frozen=True)
@@ -237,7 +249,14 @@ def swept(
     done = Store(folder / RUNS, executor, study.keep, progress).finish([case for _, case in plan.points], "sweep")
     if all(one.refused for one in done) and done[0].error is not None:
         raise done[0].error
-    return Sweep(plan, numbers, tuple(done), folder)
+    found = Sweep(plan, numbers, tuple(done), folder)
+    if study.rank is not None and study.rank not in (names := shown_numbers(found)):
+        instead = f"the table and the figure begin with {names[0]}" if names else "there is no figure"
+        warnings.warn(
+            f"rank = {study.rank!r}: no run has a value of it, so {instead}; a longer duration_s may give one",
+            stacklevel=2,
+        )
+    return found
 
 
 def chosen_numbers(names: Sequence[str], rank: str | None) -> tuple[Number, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -60,6 +61,16 @@ def test_a_number_moves_by_its_relative_change_and_a_share_by_its_own(planar: Ou
     assert ("not resolved" in found.cell("period_s")) != found.resolved
     share = compared(of(planar, middle_deficit_mean=0.01), Done(of(planar, middle_deficit_mean=0.01 + 0.02 * factor)))
     assert share.largest("middle_deficit_mean") == pytest.approx(0.02 * factor)
+
+
+def test_a_segment_that_has_no_number_is_not_compared(planar: Outcome) -> None:
+    name = "elongation_mean_max_m"
+    for before, after, moved in (
+        ([2.0, None], [2.5, None], 0.25),
+        ([2.0, None], [2.0, 2.0], math.inf),
+        ([None], [None], 0.0),
+    ):
+        assert compared(of(planar, **{name: before}), Done(of(planar, **{name: after}))).largest(name) == moved
 
 
 def test_what_is_lost_or_in_another_order_is_said(planar: Outcome, tmp_path: Path) -> None:

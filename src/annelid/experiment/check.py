@@ -159,6 +159,13 @@ def _change(value: Any, other: Any, *, of_share: bool) -> float | None:
     if value is None or other is None:
         return None if value is None and other is None else math.inf
     before, after = np.atleast_1d(value).astype(float), np.atleast_1d(other).astype(float)
+    # A segment that has not contracted yet has no force.
+    there = ~np.isnan(before)
+    if (there == np.isnan(after)).any():
+        return math.inf
+    if not there.any():
+        return None
+    before, after = before[there], after[there]
     scale = np.ones(len(before)) if of_share else np.abs(before)
     if not scale.all():
         return 0.0 if (before == after).all() else math.inf

@@ -123,6 +123,7 @@ class NetworkFile(CircuitKind):
     """
 
     sensor_fields = frozenset({"noise_m"})
+    cites = (("riddle2022", "the neurons"),)
     kind: Literal["network"] = "network"
     text: str = Field(default="", max_length=1_000_000, description=f"the TOML text: {HOW}; empty: the paper's network")
 

@@ -1,4 +1,4 @@
-"""A network with senses and readout as text: it drives a worm as the preset that it is of, and says what does not fit."""
+"""A network with senses and readout as text drives a worm as the preset that it is of, and says what does not fit."""
 
 from __future__ import annotations
 
@@ -52,8 +52,8 @@ def test_what_is_no_controller_is_refused_with_its_place(subtests: pytest.Subtes
         (('scheme = "euler"', 'scheme = "eule"'), "readout: scheme = 'eule': did you mean 'euler'"),
         (('["contraction_1", ', "["), "expand and 2 contract"),
     ):
+        own = {"controller.kind": "network", "controller.text": text.replace(*change, 1)}
         with subtests.test(words), pytest.raises(ConfigError, match=f"controller.text: .*{words}"):
-            own = {"controller.kind": "network", "controller.text": text.replace(*change, 1)}
             load_config("riddle2022-planar", own)
     with pytest.raises(ConfigError, match="the readout drives 3 segments, and the body has 4"):
         load_config("riddle2022-planar", {"body.n_segments": 4, "controller.kind": "network", "controller.text": text})

@@ -69,11 +69,11 @@ def test_springs_forces_and_weights_follow_strands_of_ones_own() -> None:
             strands.one_number("shear_modulus_Pa") / strands.one_number("young_modulus_Pa"),
         )
 
-    own = worm(0.05, 5, 8, None, None, 0.04, 0.001, 9e8)
+    own = worm(0.05, 5, 8, None, None, 0.05, 0.001, 9e8)
     assert isinstance(own.body, WormBody)
     assert (own.body.strands.radius_m, own.body.strands.young_modulus_Pa) == (0.001, 9e8)
     mesh = own.body.geometry()
-    assert np.diff(mesh.plane_x_m[mesh.ring_planes]) == pytest.approx(0.04, rel=1e-4)
+    assert np.diff(mesh.plane_x_m[mesh.ring_planes]) == pytest.approx(0.05, rel=1e-4)
     assert numbers(own) == pytest.approx(numbers(worm(0.05, 5, 8)), rel=1e-3)
     assert not check(own)
 

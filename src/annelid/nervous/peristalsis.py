@@ -127,7 +127,11 @@ def peristalsis_network(n_segments: int, parameters: PeristalsisParameters | Non
 
 def _segments(name: str, n_segments: int, p: PeristalsisParameters, *, relays_joined: bool = True) -> Network:
     """Builds `peristalsis_network`, or that without the synapses from and to its relays."""
-    require_at_least(3, n_segments=n_segments)
+    if n_segments < 3:
+        raise ConfigError(
+            f"n_segments must be at least 3, not {n_segments}, for a network whose segments take turns: drive fewer by "
+            "the clock, with controller.kind = 'timed'"
+        )
     g, segments = p.conductances, range(1, n_segments + 1)
     network = Network(name)
     for segment in segments:

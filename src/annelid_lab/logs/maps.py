@@ -36,9 +36,17 @@ class Column(Section):
     )
     scale: float | None = Field(default=None, description="SI units of the signal in one of the column's, as m per rad")
     offset: float | Literal["free"] = Field(
-        default=0.0, description="added to the column, in the signal's SI unit; free: means are made equal"
+        default=0.0,
+        description="added to the column, in the signal's SI unit; free, also of travel: means are made equal",
     )
     distance_to: Line | None = Field(default=None, description="another tracked point: the column is their distance")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _from_any_place(cls, given: object) -> object:
+        """Frees the offset of travel, since a log may count places from anywhere."""
+        is_travel = isinstance(given, Mapping) and given.get("signal") == "travel"
+        return {"offset": "free", **given} if is_travel else given
 
 
 class LogMap(Section):

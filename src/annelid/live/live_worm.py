@@ -117,7 +117,7 @@ def _posture(body: BodyKind, plant: Plant) -> Array:
         return plant.qpos
     assert isinstance(plant, Records)
     if body.own_model is not None:
-        return plant.read(True)["qpos"]
+        return np.asarray(plant.read(True)["qpos"])
     return body.outlines({**plant.read(False), **plant.read(True)})
 
 

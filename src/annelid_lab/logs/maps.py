@@ -45,8 +45,9 @@ class Column(Section):
     @classmethod
     def _from_any_place(cls, given: object) -> object:
         """Frees the offset of travel, since a log may count places from anywhere."""
-        is_travel = isinstance(given, Mapping) and given.get("signal") == "travel"
-        return {"offset": "free", **given} if is_travel else given
+        if not isinstance(given, Mapping) or given.get("signal") != "travel":
+            return given
+        return {"offset": "free", **given}
 
 
 class LogMap(Section):

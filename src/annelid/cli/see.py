@@ -214,7 +214,7 @@ def export_command(
             autocompletion=worms_from,
         ),
     ],
-    to: Annotated[str, typer.Option(metavar="FORMAT", help="csv, mat, parquet, nwb, html or mjcf.")],
+    to: Annotated[str, typer.Option(metavar="FORMAT", help="csv, mat, parquet, nwb, wcon, html or mjcf.")],
     output: Annotated[
         Path | None,
         typer.Option("--output", "-o", help="File to write, or folder of csv and parquet  [default: in the run]"),
@@ -249,6 +249,7 @@ def export_command(
     parquet  the same tables as csv, units in the metadata (pip install 'annelid[export]')
     nwb      Neurodata Without Borders: potentials as intracellular series, behaviour and positions beside
              (pip install 'annelid[export]')
+    wcon     JSON of worm trackers: the centre line over time, seen from above
     html     one page that needs nothing else: numbers, figures, configuration, what to cite
     mjcf     the model for plain MuJoCo, the last state as a keyframe; of a worm that was not run with a keyframe rest
              where it has servos, to be loaded before the first step: in it their cables are paid out

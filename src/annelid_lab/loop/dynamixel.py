@@ -9,7 +9,6 @@ time-out.
 from __future__ import annotations
 
 import struct
-from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from enum import Enum
@@ -55,8 +54,8 @@ def crc16(data: bytes) -> int:
     return crc
 
 
-class Protocol(ABC):
-    """How packets are written and read.
+class Protocol2:
+    """How packets of protocol 2.0 are written and read.
 
     Attributes:
         header: What a packet begins with.
@@ -66,31 +65,43 @@ class Protocol(ABC):
         speed_steps_per_s: Steps a second, of which a turn has 4096, in one unit of `Register.SPEED`.
     """
 
-    header: ClassVar[bytes]
-    length: ClassVar[slice]
-    registers: ClassVar[Mapping[Register, tuple[int, int]]]
-    wheel_mode: ClassVar[int]
-    speed_steps_per_s: ClassVar[float]
+    header = b"\xff\xff\xfd\0"
+    length = slice(5, 7)
+    registers: ClassVar[Mapping[Register, tuple[int, int]]] = {
+        Register.TORQUE: (64, 1), Register.MODE: (11, 1), Register.WATCHDOG: (98, 1), Register.GOAL: (116, 4),
+        Register.SPEED: (104, 4), Register.MOST_SPEED: (44, 4), Register.SENSED: (152, 2),
+    }  # fmt: skip
+    wheel_mode, extended_mode = 1, 4
+    speed_steps_per_s = 0.229 / 60 * STEPS_PER_TURN
 
-    @abstractmethod
     def packet(self, servo: int, instruction: int, parameters: bytes = b"") -> bytes:
-        """Returns a packet for the line."""
+        """Returns a packet for the line, in whose body no other may seem to begin."""
+        body = (bytes([instruction]) + parameters).replace(self.header[:3], self.header[:3] + b"\xfd")
+        whole = self.header + struct.pack("<BH", servo, len(body) + 2) + body
+        return whole + struct.pack("<H", crc16(whole))
 
-    @abstractmethod
     def opened(self, whole: bytes) -> tuple[int, int, bytes] | None:
         """Returns servo, instruction and parameters of a packet; None if its checksum is wrong."""
+        if crc16(whole[:-2]) != int.from_bytes(whole[-2:], "little"):
+            return None
+        body = whole[7:-2].replace(self.header[:3] + b"\xfd", self.header[:3])
+        return whole[4], body[0], body[1:]
 
-    @abstractmethod
     def questions(self, register: Register, servos: Sequence[int]) -> list[tuple[bytes, Sequence[int]]]:
         """Returns the packets that ask for a register, and which servos answer each."""
+        return [(self.packet(BROADCAST, 0x82, self.place(register) + bytes(servos)), servos)]
 
-    @abstractmethod
+    def answer(self, servo: int, register: Register, value: int) -> bytes:
+        """Returns a servo's answer without an error."""
+        return self.packet(servo, 0x55, b"\0" + self.number(register, value))
+
     def status(self, instruction: int, parameters: bytes) -> tuple[int, bytes] | None:
         """Returns the error and the value of an answer; None for what is no answer."""
+        return (parameters[0], parameters[1:]) if instruction == 0x55 and parameters else None
 
-    @abstractmethod
     def place(self, register: Register) -> bytes:
         """Returns address and size of a register as they stand in a packet."""
+        return struct.pack("<HH", *self.registers[register])
 
     def number(self, register: Register, value: int) -> bytes:
         """Returns a number as it stands in a register."""
@@ -100,105 +111,61 @@ class Protocol(ABC):
         """Returns the number that `number` has written."""
         return int.from_bytes(data, "little", signed=register in (Register.GOAL, Register.SPEED))
 
-    def answer(self, servo: int, register: Register, value: int) -> bytes:
-        """Returns a servo's answer without an error."""
-        return self.packet(servo, 0, self.number(register, value))
-
     def sync_write(self, register: Register, values: Mapping[int, int]) -> bytes:
         """Returns the packet that sets a register of servos."""
         data = b"".join(bytes([servo]) + self.number(register, value) for servo, value in values.items())
         return self.packet(BROADCAST, SYNC_WRITE, self.place(register) + data)
 
 
-class Protocol2(Protocol):
-    """Protocol 2.0."""
-
-    header = b"\xff\xff\xfd\0"
-    length = slice(5, 7)
-    registers: ClassVar = {
-        Register.TORQUE: (64, 1), Register.MODE: (11, 1), Register.WATCHDOG: (98, 1), Register.GOAL: (116, 4),
-        Register.SPEED: (104, 4), Register.MOST_SPEED: (44, 4), Register.SENSED: (152, 2),
-    }  # fmt: skip
-    wheel_mode, extended_mode = 1, 4
-    speed_steps_per_s = 0.229 / 60 * STEPS_PER_TURN
-    STATUS, SYNC_READ = 0x55, 0x82
-
-    def packet(self, servo: int, instruction: int, parameters: bytes = b"") -> bytes:
-        """Returns a packet, in whose body no other may seem to begin."""
-        body = (bytes([instruction]) + parameters).replace(self.header[:3], self.header[:3] + b"\xfd")
-        whole = self.header + struct.pack("<BH", servo, len(body) + 2) + body
-        return whole + struct.pack("<H", crc16(whole))
-
-    def opened(self, whole: bytes) -> tuple[int, int, bytes] | None:
-        """Opens a packet."""
-        if crc16(whole[:-2]) != int.from_bytes(whole[-2:], "little"):
-            return None
-        body = whole[7:-2].replace(self.header[:3] + b"\xfd", self.header[:3])
-        return whole[4], body[0], body[1:]
-
-    def questions(self, register: Register, servos: Sequence[int]) -> list[tuple[bytes, Sequence[int]]]:
-        """Asks all with one packet."""
-        return [(self.packet(BROADCAST, self.SYNC_READ, self.place(register) + bytes(servos)), servos)]
-
-    def status(self, instruction: int, parameters: bytes) -> tuple[int, bytes] | None:
-        """An answer begins with its error."""
-        return (parameters[0], parameters[1:]) if instruction == self.STATUS and parameters else None
-
-    def answer(self, servo: int, register: Register, value: int) -> bytes:
-        """Returns a packet of its own kind."""
-        return self.packet(servo, self.STATUS, b"\0" + self.number(register, value))
-
-    def place(self, register: Register) -> bytes:
-        """Two numbers of two bytes."""
-        return struct.pack("<HH", *self.registers[register])
-
-
-class Protocol1(Protocol):
-    """Protocol 1.0, whose servos have no watchdog, and are asked one by one."""
+class Protocol1(Protocol2):
+    """The same for protocol 1.0, whose servos have no watchdog, and are asked one by one."""
 
     header = b"\xff\xff"
     length = slice(3, 4)
-    registers: ClassVar = {
+    registers: ClassVar[Mapping[Register, tuple[int, int]]] = {
         Register.TORQUE: (24, 1), Register.MODE: (6, 4), Register.GOAL: (30, 2), Register.SPEED: (32, 2),
         Register.SENSED: (36, 2),
     }  # fmt: skip
     wheel_mode = 0
     speed_steps_per_s = 0.111 / 60 * STEPS_PER_TURN
-    READ, BACKWARD = 0x02, 0x400
+    backward = 0x400
 
     def packet(self, servo: int, instruction: int, parameters: bytes = b"") -> bytes:
-        """Returns a packet."""
+        """Has a length of one byte, and the sum of all as a check."""
         body = bytes([servo, len(parameters) + 2, instruction]) + parameters
         return self.header + body + bytes([~sum(body) & 0xFF])
 
     def opened(self, whole: bytes) -> tuple[int, int, bytes] | None:
-        """Opens a packet; in an answer the error stands where the instruction would."""
+        """In an answer the error stands where the instruction would."""
         return (whole[2], whole[4], whole[5:-1]) if ~sum(whole[2:-1]) & 0xFF == whole[-1] else None
 
     def questions(self, register: Register, servos: Sequence[int]) -> list[tuple[bytes, Sequence[int]]]:
         """Asks each with a packet of its own."""
-        return [(self.packet(servo, self.READ, self.place(register)), [servo]) for servo in servos]
+        return [(self.packet(servo, 0x02, self.place(register)), [servo]) for servo in servos]
+
+    def answer(self, servo: int, register: Register, value: int) -> bytes:
+        """Has its error, none, in place of an instruction."""
+        return self.packet(servo, 0, self.number(register, value))
 
     def status(self, instruction: int, parameters: bytes) -> tuple[int, bytes] | None:
-        """An answer has its error in place of an instruction."""
+        """Reads `answer`."""
         return instruction, parameters
 
     def place(self, register: Register) -> bytes:
-        """Two bytes."""
+        """Has one byte for either."""
         return bytes(self.registers[register])
 
     def number(self, register: Register, value: int) -> bytes:
         """A speed has its direction in a bit of its own."""
-        backward = register is Register.SPEED and value < 0
-        return super().number(register, -value | self.BACKWARD if backward else value)
+        return super().number(register, -value | self.backward if value < 0 else value)
 
     def value(self, register: Register, data: bytes) -> int:
-        """A position is never negative."""
+        """Reads `number`."""
         number = int.from_bytes(data, "little")
-        return self.BACKWARD - number if register is Register.SPEED and number & self.BACKWARD else number
+        return self.backward - number if register is Register.SPEED and number & self.backward else number
 
 
-PROTOCOLS: Mapping[int, Protocol] = {1: Protocol1(), 2: Protocol2()}
+PROTOCOLS: Mapping[int, Protocol2] = {1: Protocol1(), 2: Protocol2()}
 
 
 class PacketDecoder:
@@ -208,7 +175,7 @@ class PacketDecoder:
         rejected: How many were not valid, by what was wrong.
     """
 
-    def __init__(self, protocol: Protocol) -> None:
+    def __init__(self, protocol: Protocol2) -> None:
         """Begins with nothing."""
         self.rejected: Counter[str] = Counter()
         self._protocol, self._held = protocol, bytearray()

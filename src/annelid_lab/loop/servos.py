@@ -218,7 +218,8 @@ class ServoPlant(PacedPlant):
         now, unit = self._pace.clock(), self._bus.speed_steps_per_s
         self._wound += unit * self._speed * (now - self._turned_s)
         left = np.array(goals) - self._wiring.relaxed - self._wound
-        self._speed = np.clip(np.rint(left / (unit * self._pace.period_s)), -self._most_speed, self._most_speed)
+        most, wanted = float(self._most_speed), np.rint(left / (unit * self._pace.period_s))
+        self._speed = np.clip(wanted, -most, most)
         self._write(Register.SPEED, self._speed.astype(int).tolist())
         self._turned_s = now
 

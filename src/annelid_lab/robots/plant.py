@@ -217,22 +217,15 @@ class MjcfPlant(SavedAndRecorded):
 
     def _angles(self) -> dict[str, str]:
         """Returns the units of signals that hinges give, and says that tables take these for lengths."""
-        model = self.model
-
-        def turns(joint: int) -> bool:
-            return bool(model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE)
-
-        hinges = {
-            "qpos": {int(at) for joint, at in enumerate(model.jnt_qposadr) if turns(joint)},
-            "sensordata": {
-                int(at)
-                for at, kind, joint in zip(model.sensor_adr, model.sensor_objtype, model.sensor_objid, strict=True)
-                if kind == mujoco.mjtObj.mjOBJ_JOINT and turns(joint)
-            },
-        }
-        sensors = [place in hinges.get(where, ()) for row in self._sensors for where, place in row]
-        driven = zip(model.actuator_trntype, model.actuator_trnid[:, 0], strict=True)
-        rings = np.array([kind in _JOINTS and turns(joint) for kind, joint in driven])[self._actuators]
+        model, hinge = self.model, int(mujoco.mjtJoint.mjJNT_HINGE)
+        hinges = {("qpos", place) for place in model.jnt_qposadr[model.jnt_type == hinge].tolist()}
+        is_of_joint = model.sensor_objtype == mujoco.mjtObj.mjOBJ_JOINT
+        sensed = is_of_joint & (model.jnt_type[np.where(is_of_joint, model.sensor_objid, 0)] == hinge)
+        hinges |= {("sensordata", place) for place in model.sensor_adr[sensed].tolist()}
+        sensors = [sensor in hinges for row in self._sensors for sensor in row]
+        driven = model.actuator_trnid[self._actuators, 0]
+        is_joint = np.isin(model.actuator_trntype[self._actuators], _JOINTS)
+        rings = is_joint & (model.jnt_type[np.where(is_joint, driven, 0)] == hinge)
         if any(sensors) or rings.any():
             warnings.warn(
                 "sensors or actuators of this robot are angles: where a table says cm, read 0.01 rad, and N m for N",

@@ -125,7 +125,7 @@ def test_a_robot_of_servos_follows_with_its_lag_and_is_read_in_whole_counts() ->
 def test_servos_of_several_turns_and_wheels_get_there_and_back(wiring: Wiring) -> None:
     bus = Bus(noise_m=0.0, lag_s=0.05, wiring=wiring)
     plant = servo_plant(bus)
-    plant.reset(0)
+    sensed = plant.reset(0)
     for _ in range(150):
         sensed = plant.stride(np.tile([1.0, 0.5, 0.0], (10, 1)))
     assert bus.contraction == pytest.approx([1.0, 0.5, 0.0], abs=2e-3)

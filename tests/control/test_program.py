@@ -96,6 +96,7 @@ def test_it_is_listed_saved_and_not_laid_beside_the_paper() -> None:
     assert RunConfig.model_validate_json(config.model_dump_json()) == config
     assert published(load_config("riddle2023-rods")) != {}
     assert published(config) == {}
+    assert published(load_config("riddle2023-rods", {"body.mesh.radius_m": 0.08})) == {}, "a worm of another size"
 
 
 def planar(duration_s: float) -> RunConfig:

@@ -66,12 +66,15 @@ def material_findings(body: MeshBody) -> Iterator[Finding]:
         body.strands.one_number, ("young_modulus_Pa", "shear_modulus_Pa", "linear_density_kg_per_m")
     )
     area = pi * body.strands.radius_m**2
-    ratio = f"that is {shear / young:.2g} of the Young's modulus, where an isotropic material has 0.33 to 0.5"
+    ratio = (
+        f"that is {shear / young:.2g} of body.strands.young_modulus_Pa, where an isotropic material has 0.33 to 0.5: "
+        "both moduli change together"
+    )
     density = f"with this radius that is {line / area:.3g} kg/m^3"
     # Each with the bounds beyond which it is doubtful, and those to set it between.
     for field, value, problem, low, high, least, most in (
         ("young_modulus_Pa", young, "no strand is made of this", 1e6, 4e11, 1e6, 4e11),
-        ("shear_modulus_Pa", shear, ratio, 0.1 * young, young, young / 3, young / 2),
+        ("shear_modulus_Pa", shear, ratio, 0.25 * young, young, young / 3, young / 2),
         ("linear_density_kg_per_m", line, density, 50.0 * area, 25_000.0 * area, 500.0 * area, 2000.0 * area),
     ):
         if not low <= value <= high:

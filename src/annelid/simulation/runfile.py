@@ -178,7 +178,15 @@ def _reading(file: Path) -> Iterator[None]:
     except Exception as error:
         reason = (str(error) or type(error).__name__).splitlines()[0]
         if isinstance(error, FileNotFoundError | NotADirectoryError):
-            hint = f": {file.parent} holds no {FILE_NAME}" if file.parent.is_dir() else ""
+            within = sorted(
+                found.parent for depth in ("*", "*/*") for found in file.parent.glob(f"{depth}/{FILE_NAME}")
+            )
+            held = (
+                f"{len(within)} run{'s' * (len(within) > 1)}: name one of them, as {within[0]}"
+                if within
+                else f"no {FILE_NAME}"
+            )
+            hint = f": {file.parent} holds {held}" if file.parent.is_dir() else ""
             sentence = f"there is no run file {file}{hint}"
         elif not isinstance(error, OSError):
             sentence = f"{file} is damaged: {reason}"

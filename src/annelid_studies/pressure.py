@@ -12,9 +12,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from annelid.config.run import RunConfig
-from annelid.control import Circuit, CircuitKind, Sense, Source
-from annelid.control.sns import Sns
+from annelid.config import RunConfig
+from annelid.control import Circuit, CircuitKind, Sense, Sns, Source
 from annelid.nervous import Network, Neuron, PeristalsisParameters, peristalsis_network
 
 Strength = Annotated[float, Field(ge=0, le=5)]

@@ -49,7 +49,7 @@ def felt(step: int, values: np.random.Generator) -> Sensation:
 
 def sensed(trial: Faults, n_steps: int, seed: int = 1) -> tuple[list[Sensation], list[Sensation]]:
     """What is true and what is sensed at control steps."""
-    faults = FaultState(trial, Body(), STEP_S, 0.0)  # type: ignore[arg-type]
+    faults = FaultState(trial, Body(), STEP_S)  # type: ignore[arg-type]
     faults.reset(seed)
     random = np.random.default_rng(7)
     true = [felt(step, random) for step in range(n_steps)]
@@ -58,7 +58,7 @@ def sensed(trial: Faults, n_steps: int, seed: int = 1) -> tuple[list[Sensation],
 
 def moved(trial: Faults, commands: np.ndarray, seed: int = 1) -> np.ndarray:
     """What reaches the muscles of commands, ``(n_steps, n_muscles)``."""
-    faults = FaultState(trial, Body(), STEP_S, 0.0)  # type: ignore[arg-type]
+    faults = FaultState(trial, Body(), STEP_S)  # type: ignore[arg-type]
     faults.reset(seed)
     return np.array([faults.moved(command, step * STEP_S) for step, command in enumerate(commands)])
 

@@ -14,25 +14,38 @@ from annelid.cli import Force, command, print_paths, refuse_existing
 def new_command(
     path: Annotated[Path, typer.Argument(metavar="FILE.toml", help="The file to write.")],
     radius: Annotated[float, typer.Option(help="Radius of the tube at rest, m.")] = 0.16,
-    segments: Annotated[int, typer.Option(help="Segments, from 3 on.")] = 3,
-    helices: Annotated[int, typer.Option(help="Strands, half of each handedness; even, from 6 on.")] = 12,
+    segments: Annotated[int, typer.Option(help="Number of segments, at least 3.")] = 3,
+    helices: Annotated[
+        int, typer.Option(help="Number of strands, half of them in each direction: even, at least 6.")
+    ] = 12,
     length: Annotated[
-        float | None, typer.Option(help="Length at rest, m.  [default: so that rhombi have the paper's shape]")
+        float | None, typer.Option(help="Length at rest, m  [default: the one at which rhombi have the paper's shape]")
     ] = None,
     rear_radius: Annotated[
-        float | None, typer.Option(help="Radius of the last ring at rest, m.  [default: as --radius, no taper]")
+        float | None, typer.Option(help="Radius of the last ring at rest, m  [default: --radius, no taper]")
+    ] = None,
+    segment_length: Annotated[
+        float | None, typer.Option(help="Distance of two rings at rest, m, in place of --length")
+    ] = None,
+    strand_radius: Annotated[
+        float | None, typer.Option(help="Radius of the strands, m, taken as solid  [default: in proportion]")
+    ] = None,
+    young_modulus: Annotated[
+        float | None, typer.Option(help="Young's modulus of the strands, Pa  [default: by their weight]")
     ] = None,
     force: Force = False,
 ) -> None:
     """Write the configuration of a worm of your own size.
 
-    Strands, springs, muscles, sensors, times and limits follow from the geometry, so that the worm moves as the paper's
-    robot of rods does; the file states the rule of each. Replace what you can measure. A geometry that cannot work is
-    refused here.
+    Strands, springs, muscles, sensors, times and limits follow from the geometry, so that the worm moves as
+    riddle2023-rods does. The file states the rule of each number. Replace what you can measure. A geometry that cannot
+    work is refused. With the radius and the modulus of your own strands, springs and forces follow them.
 
     \b
     annelid new mine.toml --radius 0.05 --segments 5 --helices 8 --length 0.4
     annelid new taper.toml --radius 0.05 --rear-radius 0.04
+    annelid new tube.toml --radius 0.05 --segment-length 0.07
+    annelid new tube.toml --strand-radius 0.003 --young-modulus 2.2e8
     annelid run mine.toml
     """
     from annelid.output import write_text
@@ -41,4 +54,5 @@ def new_command(
     if path.suffix != ".toml":
         raise typer.BadParameter(f"{path} must end in .toml")
     refuse_existing(path, force, "")
-    print_paths([write_text(path, worm_text(radius, segments, helices, length, rear_radius))])
+    text = worm_text(radius, segments, helices, length, rear_radius, segment_length, strand_radius, young_modulus)
+    print_paths([write_text(path, text)])

@@ -281,7 +281,12 @@ def print_paths(paths: Iterable[Path]) -> None:
 
 
 def print_worm(config: RunConfig, *, quiet: bool = False) -> None:
-    """Prints in a line which worm it is, unless it is to be quiet."""
+    """Prints in a line which worm it is, unless it is to be quiet.
+
+    Args:
+        config: Its configuration.
+        quiet: Whether nothing is printed.
+    """
     if not quiet and not wants_json():
         size = f", {config.body.n_segments} segments, {config.duration_s:g} s"
         # What a summary has in brackets is how long it takes to compute.

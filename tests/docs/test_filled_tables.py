@@ -37,7 +37,7 @@ EXCEPTIONS = {
     ("docs/evidence/paper.md", "quantity"): "the whole page is written by `annelid paper -o report --claims FILE.md`",
     ("docs/evidence/paper.md", "#"): "the same",
     ("docs/troubleshooting.md", "code"): "exit codes, not results",
-    ("docs/presets.md", "field"): "fields of a preset, which tests/test_presets.py compares with its sources",
+    ("docs/evidence/presets.md", "field"): "fields of a preset, which tests/test_presets.py compares with its sources",
     ("docs/evidence/validation.md", "formulation"): "printed by `pytest -m slow -s tests/body/test_ring_down.py`",
     ("docs/evidence/validation.md", "step (ms)"): "the same",
     ("docs/wire.md", "bytes"): "the protocol, not results",

@@ -89,12 +89,12 @@ TASKS = {
         prints="lag -10.3",
         own=own_log,
     ),
-    "own robot": Task(
-        "docs/how_to/change_the_worm.md",
+    "own size": Task(
+        "docs/how_to/own_size.md",
         (
             "annelid new small.toml --radius 0.05 --segments 5 --helices 8 --length 0.4",
-            "annelid run small.toml -o small",
             "annelid check small.toml",
+            "annelid run small.toml -o small",
         ),
         gives=("small.toml", "small/run.nc", "small/figure7.png"),
         prints="nothing found",

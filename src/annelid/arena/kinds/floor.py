@@ -14,10 +14,9 @@ from annelid.config.run import ArenaKind, RunConfig
 from annelid.config.sections import NonNegative, Positive
 
 
-class Ground(ArenaKind):
-    """What floors and reliefs have in common; it lies along x."""
+class Sloping(ArenaKind):
+    """An arena whose axes may be tilted, so that it rises ahead of the worm."""
 
-    floor_gap_m: NonNegative = Field(default=0.009, description="distance of the floor below the mesh's lowest line")
     slope_deg: Annotated[float, Field(ge=-60, le=60)] = Field(
         default=0.0,
         description="how steeply it rises towards -x, where a worm with body.heading_deg = 0 leads; the model's axes "
@@ -28,6 +27,12 @@ class Ground(ArenaKind):
     def slope_rad(self) -> float:
         """As `slope_deg`, in rad."""
         return radians(self.slope_deg)
+
+
+class Ground(Sloping):
+    """What floors and reliefs have in common; it lies along x."""
+
+    floor_gap_m: NonNegative = Field(default=0.009, description="distance of the floor below the mesh's lowest line")
 
     @property
     def floor_depth_m(self) -> float:

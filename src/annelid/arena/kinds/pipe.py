@@ -10,9 +10,9 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from annelid.arena.centre_line import AHEAD, UP, Bore, Course, Curve, Straight
-from annelid.arena.kinds.floor import refuse_heading
+from annelid.arena.kinds.floor import Sloping, refuse_heading
 from annelid.arena.surface import Implicit, Level, Shape, grid_faces, lengths
-from annelid.config.run import ArenaKind, RunConfig
+from annelid.config.run import RunConfig
 from annelid.config.sections import NonNegative, Positive
 from annelid.protocols import Array
 
@@ -34,7 +34,7 @@ PANEL_LENGTH_M, PANELS_AROUND = 0.05, 32
 HALF_THICKNESS_M = 0.01
 
 
-class Pipe(ArenaKind):
+class Pipe(Sloping):
     """A pipe: a centre line of straights and curves, and a bore that may change along it.
 
     The worm starts inside the entry, which goes on behind it; the exit goes on too. The bore's lowest line at the entry

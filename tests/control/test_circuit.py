@@ -191,7 +191,6 @@ KINDS: dict[str, dict[str, Any]] = {
     "sns": {},
     "adaptive": {"drive": 0.3},
     "sns-pressure": {},
-    "sns-waiting": {},
     "sns-robust": {"motor_time_constant_s": 0.2, "descending": {"lift": 0.45}},
 }
 HELD = {"startup_hold_s": 0.013, "hysteresis_m": 0.004}

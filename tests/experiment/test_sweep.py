@@ -214,6 +214,21 @@ def test_results_are_written_and_read_back_alike(done: Sweep) -> None:
     assert results_table(done).row_count == 4
 
 
+def test_a_rank_without_values_is_said(tmp_path: Path) -> None:
+    with pytest.warns(
+        UserWarning, match="rank = 'period_s': no run has a value of it, so the table and the figure begin"
+    ):
+        swept(study(ONE, rank="period_s"), tmp_path)
+
+
+def test_a_modulus_is_varied_with_the_other_that_follows() -> None:
+    vary = {"field": "body.strands.young_modulus_Pa", "values": [3e8, 1e9]}
+    with pytest.warns(UserWarning, match="leaves body.strands.shear_modulus_Pa = 200000000.0"):
+        plan_of(study([vary], preset="riddle2023-rods"))
+    plan = plan_of(study([vary | {"follow": {"body.strands.shear_modulus": 0.667}}], preset="riddle2023-rods"))
+    assert [case.config.body.strands.shear_modulus_Pa for _, case in plan.points] == [2.001e8, 6.67e8]  # type: ignore[attr-defined]
+
+
 def test_numbers_alone_may_be_kept_and_chosen(tmp_path: Path) -> None:
     data = annelid.sweep(
         study(ONE, keep="outcomes", outputs=["duration_s", "muscle_work_J"]).model_dump(by_alias=True), tmp_path

@@ -84,7 +84,7 @@ def test_what_cannot_be_varied_is_refused_in_a_sentence(subtests: pytest.Subtest
 
 
 def test_every_controller_has_something_to_tune_but_a_program(subtests: pytest.Subtests) -> None:
-    for kind in ("sns", "adaptive", "sns-robust", "sns-pressure", "sns-waiting", "sine", "timed", "shc", "phase-chain"):
+    for kind in ("sns", "adaptive", "sns-robust", "sns-pressure", "sine", "timed", "shc", "phase-chain"):
         with subtests.test(kind):
             assert parsed_variables([], load_config(PRESET, {"controller.kind": kind}))
     program = {"controller": {"kind": "program", "contractions": [{"segment": 1, "start_s": 0.0, "stop_s": 1.0}]}}

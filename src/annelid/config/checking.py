@@ -151,6 +151,8 @@ GONE: Mapping[str, tuple[str, Any]] = {
         "all strands are alike; segments may differ (body.strands.young_modulus_Pa)",
         None,
     ),
+    "body.relative_friction": ("the skin rubs alike everywhere; set arena.friction", 1.0),
+    "body.rings.no_load_speed_m_per_s": ("a servo winds as fast as its speed limit, up to its force limit", None),
     "arena.rail_gap_m": ("guard rails stand on arena.kind = 'floor' only", None),
     "arena.posts": ("posts stand on arena.kind = 'floor' only", []),
     "arena.friction_cone": ("rods always have elliptic cones, and a chain pyramidal ones", ()),

@@ -92,7 +92,19 @@ class Plan:
         fixed = flattened(self.study.set)
         seeds = [{"seed": seed} for seed in self.levels[REPEAT]] if REPEAT in self.levels else [{}]
         varied = [dict(zip(self.fields, sample, strict=True)) for sample in self.samples]
-        return tuple((values, Case(self.study.preset, fixed | values | seed)) for values in varied for seed in seeds)
+        follows = dict(zip(self.fields, (vary.follow for vary in self.study.vary), strict=True))
+        return tuple(
+            (values, Case(self.study.preset, fixed | values | _following(follows, values) | seed))
+            for values in varied
+            for seed in seeds
+        )
+
+
+def _following(follows: Mapping[str, Mapping[str, float]], values: Mapping[str, Any]) -> dict[str, float]:
+    """Values of the fields that keep a ratio to a varied one, by dotted path."""
+    return {
+        path: float(f"{ratio * values[field]:.6g}") for field, paths in follows.items() for path, ratio in paths.items()
+    }
 
 
 @dataclass(frozen=True)
@@ -280,6 +292,12 @@ def swept(
         write_results(found)
         chosen = spread_evenly(check, [i for i, one in enumerate(done) if one.status == "complete"])
         found = replace(found, checks=dict(zip(chosen, check_runs(store, [cases[i] for i in chosen]), strict=True)))
+    if study.rank is not None and study.rank not in (names := shown_numbers(found)):
+        instead = f"the table and the figure begin with {names[0]}" if names else "there is no figure"
+        warnings.warn(
+            f"rank = {study.rank!r}: no run has a value of it, so {instead}; a longer duration_s may give one",
+            stacklevel=2,
+        )
     return found
 
 

@@ -13,26 +13,28 @@ from annelid.config.answers import Post, Walls
 from annelid.config.run import ArenaKind, RunConfig
 from annelid.config.sections import NonNegative, Positive
 
-
-class Sloping(ArenaKind):
-    """An arena whose axes may be tilted, so that it rises ahead of the worm."""
-
-    slope_deg: Annotated[float, Field(ge=-60, le=60)] = Field(
-        default=0.0,
+Slope = Annotated[
+    float,
+    Field(
+        ge=-60,
+        le=60,
         description="how steeply it rises towards -x, where a worm with body.heading_deg = 0 leads; the model's axes "
         "lie in the slope",
-    )
+    ),
+]
+"""Angle of an arena's axes, degrees."""
+
+
+class Ground(ArenaKind):
+    """What floors and reliefs have in common; it lies along x."""
+
+    floor_gap_m: NonNegative = Field(default=0.009, description="distance of the floor below the mesh's lowest line")
+    slope_deg: Slope = 0.0
 
     @property
     def slope_rad(self) -> float:
         """As `slope_deg`, in rad."""
         return radians(self.slope_deg)
-
-
-class Ground(Sloping):
-    """What floors and reliefs have in common; it lies along x."""
-
-    floor_gap_m: NonNegative = Field(default=0.009, description="distance of the floor below the mesh's lowest line")
 
     @property
     def floor_depth_m(self) -> float:

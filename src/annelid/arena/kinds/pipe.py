@@ -10,9 +10,9 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from annelid.arena.centre_line import AHEAD, UP, Bore, Course, Curve, Straight
-from annelid.arena.kinds.floor import Sloping, refuse_heading
+from annelid.arena.kinds.floor import Slope, refuse_heading
 from annelid.arena.surface import Implicit, Level, Shape, grid_faces, lengths
-from annelid.config.run import RunConfig
+from annelid.config.run import ArenaKind, RunConfig
 from annelid.config.sections import NonNegative, Positive
 from annelid.protocols import Array
 
@@ -34,7 +34,7 @@ PANEL_LENGTH_M, PANELS_AROUND = 0.05, 32
 HALF_THICKNESS_M = 0.01
 
 
-class Pipe(Sloping):
+class Pipe(ArenaKind):
     """A pipe: a centre line of straights and curves, and a bore that may change along it.
 
     The worm starts inside the entry, which goes on behind it; the exit goes on too. The bore's lowest line at the entry
@@ -63,6 +63,7 @@ class Pipe(Sloping):
     narrowest_m: Positive = Field(default=0.13, description="radius of the narrowest bore of a taper or an hourglass")
     profile_start_m: NonNegative = Field(default=0.2, description="where the bore begins to narrow")
     profile_length_m: Positive = Field(default=0.5, description="length over which it changes")
+    slope_deg: Slope = 0.0
 
     @model_validator(mode="after")
     def _a_pipe_that_can_be(self) -> Self:
@@ -83,6 +84,11 @@ class Pipe(Sloping):
         if self.course == "helix" and turn_deg > 270 and self.pitch_m <= 2.2 * widest:
             refuse("pitch_m", f"must be more than {2.2 * widest:g} for turns that lie above each other")
         return self
+
+    @property
+    def slope_rad(self) -> float:
+        """As `slope_deg`, in rad."""
+        return radians(self.slope_deg)
 
     @property
     def floor_depth_m(self) -> float:

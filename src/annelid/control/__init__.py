@@ -12,6 +12,7 @@ from annelid.control.base import (
 from annelid.control.circuit import Circuit, Readout
 from annelid.control.circuit_controller import CircuitController, CircuitKind
 from annelid.control.network import NetworkController
+from annelid.control.network_file import circuit_of_text, circuit_text
 from annelid.control.senses import SENSED, Pulse, Sense, Source, Switch, lengthening_m
 from annelid.control.sns import DRIVE_HINT, paper_controller
 from annelid.control.turning import TurningController
@@ -38,6 +39,8 @@ __all__ = [
     "Switch",
     "TurningController",
     "WrappedController",
+    "circuit_of_text",
+    "circuit_text",
     "lengthening_m",
     "own_controller",
     "paper_controller",

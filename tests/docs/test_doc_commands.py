@@ -117,7 +117,7 @@ FAST = ("README.md", "docs/how_to/read_a_run.md")
 
 SCRIPTS_ELSEWHERE = {
     "docs/tutorials/": "tests/docs/test_site.py runs the tutorials",
-    "docs/upstream/": "whole reproductions of what the engine does, half a minute each",
+    "docs/sweeps.md": "executors of batch systems and of MPI, which are not installed with the tests",
 }
 """Pages whose Python is not executed here, and why."""
 

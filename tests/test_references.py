@@ -33,6 +33,7 @@ CONTROLLERS = {
     "shc": {"horchler2015", "shaw2012", "stone1990", "daltorio2013"},
     "phase-chain": {"ijspeert2007"},
     "timed": {"riddle2025models"},
+    "network": {"riddle2022"},
     "sine": set(),
 }
 

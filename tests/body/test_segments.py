@@ -102,7 +102,7 @@ def test_rings_of_a_tapering_worm_are_polygons_of_its_radius_there() -> None:
 )
 def test_a_tapering_worm_starts_on_its_belly(preset: str, radii_m: list[float]) -> None:
     ranges = [[0.59 * 6.0 * radius, 1.11 * 6.0 * radius] for radius in radii_m]
-    changes = {"body.mesh.radius_m": radii_m, "body.rings.length_range_m": ranges, "body.heading_deg": 30.0}
+    changes = {"body.mesh.radius_m": radii_m, "body.rings.length_range_m": ranges}
     plant = WormPlant(load_config(preset, changes))
     rings = plant.posture.crossing[plant.geometry.rings]
     lowest = rings[..., 2].min(axis=1)

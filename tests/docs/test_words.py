@@ -46,7 +46,7 @@ WORDS = {
 LONGEST, LONGEST_FOR_USERS = 45, 30
 """Words of a sentence, on any page and on those that users read first."""
 
-FOR_USERS = ("docs/index.md", "docs/start.md")
+FOR_USERS = ("README.md", "docs/index.md", "docs/start.md", "docs/tutorials/", "docs/how_to/")
 
 LONG_SENTENCES = (
     "docs/evidence/paper.md",

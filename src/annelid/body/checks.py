@@ -6,7 +6,7 @@ Everything here follows from the configuration alone, in closed form, in under a
 from __future__ import annotations
 
 from collections.abc import Iterator
-from math import cos, degrees, hypot, pi, radians, tan
+from math import degrees, hypot, pi, radians, tan
 
 from annelid.body.estimates import WALKS_FROM, rhombus_of, soft_constraint
 from annelid.body.mesh import MeshBody
@@ -93,8 +93,7 @@ def ground_findings(config: RunConfig, body: MeshBody) -> Iterator[Finding]:
     if not arena.slope_rad:
         return
     # On ground that rises ahead the skin slides towards the rear.
-    rise = arena.slope_rad * cos(radians(body.heading_deg))
-    backward = rise > 1e-9 and arena.backward_friction is not None
+    backward = arena.slope_rad > 0.0 and arena.backward_friction is not None
     field, friction = ("backward_friction", arena.backward_friction) if backward else ("friction", arena.friction)
     steepness = tan(abs(arena.slope_rad))
     if steepness >= (friction or 0.0):

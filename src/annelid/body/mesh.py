@@ -154,11 +154,6 @@ class Springs(Section):
 class MeshBody(BodyKind):
     """A 3D worm without its rings and its formulation, which ask it what they need."""
 
-    heading_deg: Annotated[float, Field(ge=-360, le=360)] = Field(
-        default=0.0,
-        description="where the worm leads at the start, about its front end: 0 is towards -x, positive to its left "
-        "(90: towards -y)",
-    )
     mesh: Mesh = Mesh()
     strands: Strands = Strands()
     pins: Pins = Pins()
@@ -190,11 +185,6 @@ class MeshBody(BodyKind):
                 Knob(field, "springs (N/m)", 1.0, 0.0, high, 0.1, f"Stiffness of the axial springs. {rebuilt}")
             )
         return tuple(knobs)
-
-    @property
-    def first_heading_deg(self) -> float:
-        """As `heading_deg`."""
-        return self.heading_deg
 
     @property
     def first_sensor(self) -> str:

@@ -12,8 +12,9 @@ from annelid.control.base import (
 from annelid.control.circuit import Circuit, Readout
 from annelid.control.circuit_controller import CircuitController, CircuitKind
 from annelid.control.network import NetworkController
+from annelid.control.network_file import circuit_of_text, circuit_text
 from annelid.control.senses import SENSED, Pulse, Sense, Source, Switch, lengthening_m
-from annelid.control.sns import DRIVE_HINT, paper_controller
+from annelid.control.sns import DRIVE_HINT, Sns, paper_controller
 from annelid.control.turning import TurningController
 from annelid.control.user_controller import own_controller
 from annelid.lazy import lazy
@@ -34,10 +35,13 @@ __all__ = [
     "SegmentController",
     "Sense",
     "Slope",
+    "Sns",
     "Source",
     "Switch",
     "TurningController",
     "WrappedController",
+    "circuit_of_text",
+    "circuit_text",
     "lengthening_m",
     "own_controller",
     "paper_controller",

@@ -18,10 +18,18 @@ Output: TypeAlias = str | tuple[str, str]
 """An output of the network, or two, of which the first contracts and the second expands."""
 
 
-class NetworkController(CircuitController):
-    """Drives a worm by a network of a user's own, as the circuit of it does.
+class OwnCircuitController(CircuitController):
+    """Steps a circuit of a user's own; recorded are all potentials and slow gates by name, and the network itself."""
 
-    Recorded are all potentials and slow gates by name, and the network itself.
+    recorded = CircuitController.recorded[:2]
+
+    def _attrs(self) -> dict[str, float | int | str]:
+        text = self.circuit.network.to_toml()
+        return {"network": text} if len(text) <= LONGEST_TEXT else {}
+
+
+class NetworkController(OwnCircuitController):
+    """Drives a worm by a network of a user's own, as the circuit of it does.
 
     Example::
 
@@ -32,8 +40,6 @@ class NetworkController(CircuitController):
     Raises:
         ConfigError: As of `Circuit`, `Readout` and `CircuitController`, or outputs of which some are one and some two.
     """
-
-    recorded = CircuitController.recorded[:2]
 
     def __init__(
         self,
@@ -79,7 +85,3 @@ class NetworkController(CircuitController):
                 "of the run"
             )
         return super().stride(sensation, n_steps)
-
-    def _attrs(self) -> dict[str, float | int | str]:
-        text = self.circuit.network.to_toml()
-        return {"network": text} if len(text) <= LONGEST_TEXT else {}

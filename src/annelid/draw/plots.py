@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from annelid.analysis.paper import published
+from annelid.analysis.paper import changed_fields, published
 from annelid.analysis.rhythm import CONTRACTED, segment_activation, stretches
+from annelid.config.fidelity import RESOLUTION
 from annelid.draw.canvas import canvas, line_entries, line_looks, panel_title, plain, save
 from annelid.draw.figures import RUN_FIGURES
 from annelid.errors import RunFileError
@@ -186,6 +187,9 @@ def _name_level(axes: Axes, level: float, text: str) -> None:
 def _published_levels(run: Run) -> list[float]:
     """Where each segment's published elongation ends, cm: above the lowest length where it is peak to peak, or rest."""
     beside = published(run.config, run.data.attrs.get("controller"))
+    changed = set(changed_fields(run.config)[1]).difference(RESOLUTION) if beside else set()
+    if any(field.startswith(("body.", "controller.")) for field in changed):
+        return []  # Of another worm they would be read as what it must reach.
     starts = {
         "elongation_first_helix_pp_m": run.data["stretch_length"].values[:, :, 0].min(axis=0),
         "elongation_mean_max_m": run.data["stretch_rest_length"].values.mean(axis=1),

@@ -171,7 +171,7 @@ class Sweep:
         meanings = field_paths()
         for i, field in enumerate(plan.fields):
             dim, values = (field, levels[field]) if field in levels else (SAMPLE, [row[i] for row in plan.samples])
-            attrs = {"units": unit_of(field) or "1", "long_name": meanings[field] or field}
+            attrs = {"units": unit_of(field) or "1", "long_name": meanings.get(field) or field}
             coords[field] = (dim, _column(values), attrs)
         return xr.Dataset(
             variables,

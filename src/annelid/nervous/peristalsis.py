@@ -1,4 +1,4 @@
-"""The peristalsis network of Riddle et al. 2022 and 2023 for any number of segments, and two networks made from it.
+"""The peristalsis network of Riddle et al. 2022 and 2023 for any number of segments, and one with a descending drive.
 
 Each segment has a half-centre, the contraction neuron (U1 in the papers) against the expansion neuron (U2), a sensory
 neuron (U3) that its stretch sensor drives while the segment is at rest length, and a relay (U4) to the next segment.
@@ -13,7 +13,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from functools import cached_property
 
-from annelid.errors import ConfigError, require_at_least, require_positive
+from annelid.errors import ConfigError, require_positive
 from annelid.nervous.half_centre import HalfCentre, add_half_centre, add_hold
 from annelid.nervous.network import Network
 from annelid.nervous.neurons import Neuron
@@ -122,7 +122,11 @@ def peristalsis_network(n_segments: int, parameters: PeristalsisParameters | Non
     Raises:
         ConfigError: Fewer than 3 segments, or parameters that give a negative conductance.
     """
-    require_at_least(3, n_segments=n_segments)
+    if n_segments < 3:
+        raise ConfigError(
+            f"n_segments must be at least 3, not {n_segments}, for a network whose segments take turns: drive fewer by "
+            "the clock, with controller.kind = 'timed'"
+        )
     p, segments = parameters or PeristalsisParameters(), range(1, n_segments + 1)
     g, network = p.conductances, Network(f"peristalsis of {n_segments} segments")
     for segment in segments:
@@ -195,57 +199,4 @@ def adaptive_peristalsis_network(
     network = peristalsis_network(n_segments, p)
     halves = (f"{half}_{segment}" for segment in range(1, n_segments + 1) for half in ("contraction", "expansion"))
     add_drive(network, p, halves, drive_conductance_uS(p), drive_time_constant_ms)
-    return network
-
-
-def pressure_network(
-    n_segments: int,
-    parameters: PeristalsisParameters | None = None,
-    *,
-    hold: float = 1.0,
-    release: float = 1.8,
-    exchange: float = 0.8,
-    pressure_ms: float = 30.0,
-) -> Network:
-    """Builds the peristalsis network with pressure feedback against slip; the design is our own.
-
-    On a body with weight a contracting segment stretches its neighbour, whose stretch sensor then switches off too
-    early: several segments contract at once, and the front drags along the ground. Three kinds of synapse onto sensory
-    neurons, which keep a segment expanded and end its contraction, even the wave out, so that no segment leaves the
-    ground before the one ahead has its length (the aim of Daltorio et al. 2013). Before the first segment comes the
-    last. Neurons ``pressure_s`` and ``extension_s`` of every segment come behind those of `peristalsis_network`, with
-    inputs ``load_s`` and ``length_s`` of which ``Gm R`` nA is the full scale.
-
-    Args:
-        n_segments: Number of segments, at least 3.
-        parameters: Of the paper's network.
-        hold: Potential, over R, that full pressure gives its own segment's sensory neuron: one on the ground stays
-            expanded, stretched or not, and one that lands becomes an anchor.
-        release: Currents of a stretch sensor that a full extension neuron takes from the sensory neuron of the next
-            segment, which leaves the ground once this one is extended.
-        exchange: Potential, over R, that a contraction gives the sensory neuron two segments before, so that one
-            segment shortens while another one lengthens. Three segments have none: there it would be the next one.
-        pressure_ms: Time constant of the pressure neurons, ms.
-
-    Raises:
-        ConfigError: As `peristalsis_network`; a strength below 0, or beyond what the excitatory reversal can give.
-    """
-    require_at_least(0, hold=hold, release=release, exchange=exchange)
-    p = parameters or PeristalsisParameters()
-    network, leak = peristalsis_network(n_segments, p), p.leak_conductance_uS
-    segments = range(1, n_segments + 1)
-    for segment in segments:
-        network.add_neuron(f"pressure_{segment}", Neuron(pressure_ms * leak, leak))
-        network.add_neuron(f"extension_{segment}", p.leaky_neuron)
-    for segment in segments:
-        two_before = (segment - 3) % n_segments + 1
-        if hold > 0:
-            network.add_synapse(f"pressure_{segment}", f"sensory_{segment}", p.transmission(hold))
-        if exchange > 0 and n_segments > 3:
-            network.add_synapse(f"contraction_{segment}", f"sensory_{two_before}", p.transmission(exchange))
-        if release > 0:
-            synapse = p.inhibitory(release * p.conductances.relay_to_next_sensory)
-            network.add_synapse(f"extension_{segment}", f"sensory_{segment % n_segments + 1}", synapse)
-        network.add_input(f"load_{segment}", f"pressure_{segment}")
-        network.add_input(f"length_{segment}", f"extension_{segment}")
     return network

@@ -16,7 +16,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from annelid.config import RunConfig
-from annelid.config.checking import GONE, present_fields
+from annelid.config.checking import gone_fields, present_fields
 from annelid.errors import ConfigError, RunFileError, UnreadableText
 from annelid.registry import Registry
 from annelid.simulation import digest
@@ -140,7 +140,7 @@ def migrated(data: xarray.Dataset) -> xarray.Dataset:
     Files of schema 0, those of annelid 0.1, have neither warnings nor processor time. Their configuration is valid as
     it is: fields that are newer default to what 0.1 did, guards excepted. Signals that 0.1 did not record stay absent.
     Those up to schema 1 name no published numbers. Where a field acted that is gone
-    (`annelid.config.checking.GONE`), the run says so among its warnings, and is not continued.
+    (`annelid.config.checking.gone_fields`), the run says so among its warnings, and is not continued.
     """
     if data.attrs.get(SCHEMA, 0) < 1:
         added = {WARNINGS: ((), ""), CPU_TIME: ((), 0.0)}
@@ -160,7 +160,7 @@ def _without_gone_fields(data: xarray.Dataset) -> xarray.Dataset:
         return data  # What is wrong with it, its reader says.
     if acted:
         told = (
-            f"{path} was {value}, a field that is gone ({GONE[path][0]}): its command does not repeat it"
+            f"{path} was {value}, a field that is gone ({gone_fields()[path]['now']}): its command does not repeat it"
             for path, value in sorted(acted.items())
         )
         data = data.assign({WARNINGS: ((), "\n".join(filter(None, (str(data[WARNINGS].values), *told))))})

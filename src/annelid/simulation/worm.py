@@ -159,7 +159,7 @@ class WormPlant:
         data = self.data = mujoco.MjData(self.model)
         self.qpos, self.act, self.ctrl, self.warned = data.qpos, data.act, data.ctrl, data.warning.number
         self.start = start_placement(anatomy, body)
-        self.mechanics = body.formulation.mechanics(self.model, data, self.geometry, body, arena, self._step_s)
+        self.mechanics = body.formulation.mechanics(self.model, data, body, arena, self._step_s)
         self.ground = MovingGround(self.model, self.geometry, arena) if arena.has_moving_planes else None
         self.reset(0)
 

@@ -113,7 +113,6 @@ def _print_table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None
     from annelid.terminal import Console
 
     table = Table(*headings, box=None, pad_edge=False)
-    table.columns[0].overflow = "fold"
     for row in rows:
         table.add_row(*row)
     Console().print(table)
@@ -136,9 +135,15 @@ def runs_command(
     found = list(runs_below(folder)) if folder != Path("runs") or folder.is_dir() else []
     if give([asdict(run) for run in found]):
         return
-    rows = []
+    from rich.table import Table
+
+    from annelid.terminal import Console
+
+    table = Table("folder", "preset", "time (s)", "size (MB)", "written (UTC)", "end", box=None)
+    table.columns[0].overflow = "fold"
+    table.columns[1].no_wrap = True
     for run in found:
         duration = "-" if run.duration_s is None else f"{run.duration_s:g}"
         size = f"{run.size_bytes / 1e6:.1f}"
-        rows.append((str(run.folder), run.preset or "-", duration, size, run.changed[:10], run.status))
-    _print_table(("folder", "preset", "time (s)", "size (MB)", "written (UTC)", "end"), rows)
+        table.add_row(str(run.folder), run.preset or "-", duration, size, run.changed[:10], run.status)
+    Console().print(table)

@@ -215,12 +215,12 @@ def test_to_first_order_a_distance_is_as_near_as_stated() -> None:
 def test_a_slope_leans_gravity_and_leaves_the_ground_level() -> None:
     from annelid.arena.ground import gravity_of
 
-    slope = Floor(slope_deg=10.0)
-    pull = gravity_of(slope)
-    assert np.linalg.norm(pull) == pytest.approx(9.81)
-    # It pulls the worm, which leads towards -x, back down: towards +x.
-    assert pull[0] / -pull[2] == pytest.approx(tan(radians(10.0)))
-    assert pull[0] == pytest.approx(9.81 * sin(radians(10.0)))
+    for arena in (Floor(slope_deg=10.0), Pipe(slope_deg=10.0)):
+        pull = gravity_of(arena)
+        assert np.linalg.norm(pull) == pytest.approx(9.81)
+        # It pulls the worm, which leads towards -x, back down: towards +x.
+        assert pull[0] / -pull[2] == pytest.approx(tan(radians(10.0)))
+        assert pull[0] == pytest.approx(9.81 * sin(radians(10.0)))
     assert isinstance(surface_of(Pipe()), PipeWall)
 
 

@@ -35,6 +35,7 @@ GENERATED = {
     "reference/numbers.md": numbers_reference.page,
     "reference/run_file.md": run_file_reference.page,
 }
+"""What is added to pages that have only their introduction in the repository."""
 
 
 def build(folder: Path) -> Path:
@@ -69,7 +70,8 @@ def gather(target: Path) -> None:
     shutil.rmtree(target, ignore_errors=True)
     shutil.copytree(PAGES, target, ignore=shutil.ignore_patterns(Path(__file__).parent.name))
     for name, page in GENERATED.items():
-        (target / name).write_text(page(), encoding="utf-8")
+        with (target / name).open("a", encoding="utf-8") as introduced:
+            introduced.write(f"\n{page()}")
     for tutorial in sorted((PAGES / "tutorials").glob("*.md")):
         shown = notebooks.run(tutorial.read_text(encoding="utf-8"), tutorial.stem)
         (target / "tutorials" / tutorial.name).write_text(shown.markdown, encoding="utf-8")

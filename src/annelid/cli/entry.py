@@ -261,15 +261,15 @@ def _start(
         bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version.")
     ] = False,
 ) -> None:
-    """Simulate a soft, peristaltic earthworm robot driven by a synthetic nervous system.
+    """Simulate a soft earthworm robot that crawls by peristalsis and is driven by a synthetic nervous system.
 
     \b
-    annelid run                        run the paper's worm as rods: a few seconds
-    annelid run riddle2023             run it as the paper built it: about a minute
-    annelid run riddle2022-planar      run the planar worm: a few seconds
-    annelid list presets               what else there is
-    annelid study paper                reproduce and examine the whole paper: about 40 minutes
-    annelid doctor                     is everything in place?
+    annelid run                        the paper's worm: a few seconds
+    annelid run riddle2023             in the paper's own formulation: a minute
+    annelid run riddle2022-planar      the planar worm: a few seconds
+    annelid list presets               all worms
+    annelid study paper                the report on the whole paper: an hour
+    annelid doctor                     what is missing on this machine
 
     Exit codes: 0 done, 2 refused, 3 stopped by a guard, 4 runs failed, 5 all runs failed, 130 interrupted, 1 anything
     unexpected. With --json, a command prints its result as one JSON document.

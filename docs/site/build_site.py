@@ -17,6 +17,7 @@ from pathlib import Path
 
 import yaml
 
+import annelid
 import command_reference
 import configuration_reference
 import examples_page
@@ -55,6 +56,7 @@ def build(folder: Path) -> Path:
     gather(pages)
     settings = yaml.safe_load(SETTINGS.read_text(encoding="utf-8"))
     settings |= {"docs_dir": pages.name, "site_dir": site.name}
+    settings["site_name"] += f" {annelid.__version__}"
     settings["nav"] = expanded(settings["nav"], [path.relative_to(pages).as_posix() for path in pages.rglob("*.md")])
     (folder / "mkdocs.yml").write_text(yaml.safe_dump(settings, sort_keys=False), encoding="utf-8")
     shutil.rmtree(site, ignore_errors=True)

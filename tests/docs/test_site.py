@@ -39,6 +39,7 @@ def test_a_tutorial_runs_from_top_to_bottom(tutorial: Path, tmp_path: Path, monk
 def test_the_site_is_whole(site: Path) -> None:
     pages = {path.relative_to(site).with_suffix("").as_posix() for path in site.rglob("*.html")}
     assert {Path(name).relative_to("docs").with_suffix("").as_posix() for name in PAGES if name != "README.md"} <= pages
+    assert f"annelid {annelid.__version__}" in (site / "start.html").read_text(encoding="utf-8")
     assert list(broken_links(site)) == []
     assert list(fetched_from_elsewhere(site)) == []
 

@@ -40,7 +40,7 @@ EXIT_INTERRUPTED = 130
 
 PANELS = ("Make", "See", "Vary", "Exchange", "Robot", "Studies", "Help")
 """Headings of the help, below which the commands stand in the order in which they join."""
-_OLD: Mapping[str, tuple[str, ...]] = {
+OLD_COMMANDS: Mapping[str, tuple[str, ...]] = {
     "build": ("export", "--to", "mjcf"),
     "experiment": ("study",),
     "pseudo-robot": ("loop", "--pseudo"),
@@ -48,7 +48,7 @@ _OLD: Mapping[str, tuple[str, ...]] = {
     **{name: ("list", name) for name in ("presets", "arenas", "runs")},
     **{name: ("study", name) for name in ("limit-cycle", "bench", "robustness", "challenge")},
 }
-"""What commands of before are now; they go on for one release."""
+"""What commands of before are now; they go on for one release (docs/roadmap.md lists them)."""
 WIDEST = 200
 """Characters of a command's line in the help, which goes on in the next line and is never cut."""
 
@@ -90,7 +90,7 @@ class _Sentences(_Panels):
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Finds a command, by its old name with a hint."""
-        if (now := _OLD.get(args[0])) is not None:
+        if (now := OLD_COMMANDS.get(args[0])) is not None:
             complain(f"hint: annelid {args[0]} is now annelid {' '.join(now)}; the old name goes with the next release")
             args = [*now, *args[1:]]
         return super().resolve_command(ctx, args)

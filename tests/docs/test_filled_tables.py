@@ -76,7 +76,6 @@ STALE: tuple[str, ...] = (
     "challenge_wave_5ms.csv",
     "firmware.csv",
     "pipes.csv",
-    "riddle2025.csv",
     "robustness_three_segments.json",
     "slip.csv",
     "tune_timed.csv",

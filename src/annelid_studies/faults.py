@@ -82,14 +82,14 @@ class Faults(TrialKind):
     def between(self, controller: Controller, config: RunConfig, plant: Plant) -> Controller:
         """Returns a controller under these faults, as `TrialKind.between`."""
         kind = SavedFaultyController if isinstance(controller, Stateful) else FaultyController
-        state = FaultState(self, plant, config.clock.control_timestep_s, getattr(config.body, "heading_deg", 0.0))
+        state = FaultState(self, plant, config.clock.control_timestep_s)
         return kind(controller, state)
 
 
 class FaultState(SavedAndRecorded):
     """The faults of one worm's sensors and muscles, and what they depend on."""
 
-    def __init__(self, trial: Faults, plant: Plant, control_timestep_s: float, heading_deg: float) -> None:
+    def __init__(self, trial: Faults, plant: Plant, control_timestep_s: float) -> None:
         """Begins as `reset`."""
         self.trial, self._plant = trial, plant
         self._timestep_s, self._n_muscles = control_timestep_s, plant.n_muscles
@@ -103,7 +103,7 @@ class FaultState(SavedAndRecorded):
         sensed = plant.reset(0)
         if saved is not None:
             saved.set_state(state)
-        self._force_N = _to_the_left(plant, heading_deg, trial.push_N) if isinstance(plant, WormPlant) else np.zeros(0)
+        self._force_N = _to_the_left(plant, trial.push_N) if isinstance(plant, WormPlant) else np.zeros(0)
         self._n_stretch = sensed.stretch_m.size
         self._n_values = sum(getattr(sensed, name).size for name in SENSORS)
         self.reset(0)
@@ -189,11 +189,11 @@ def _slot(time_s: float, length_s: float) -> int:
     return int((time_s + SLACK_S) / length_s)
 
 
-def _to_the_left(plant: WormPlant, heading_deg: float, force_N: float) -> Array:
+def _to_the_left(plant: WormPlant, force_N: float) -> Array:
     """A force on the ring of the middle segment to the worm's left, ``(n_crossings, 3)``."""
-    ring, angle = plant.geometry.rings[plant.n_segments // 2], np.radians(heading_deg)
+    ring = plant.geometry.rings[plant.n_segments // 2]
     force = np.zeros((plant.geometry.n_crossings, 3))
-    force[ring] = force_N / len(ring) * np.array([np.sin(angle), -np.cos(angle), 0.0])
+    force[ring, 1] = -force_N / len(ring)
     return force
 
 

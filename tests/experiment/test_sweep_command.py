@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 import subprocess
 import sys
 import time
@@ -46,21 +45,6 @@ def test_a_sweep_ends_with_a_table_and_its_files(annelid: Command) -> None:
     assert [row["controller.scheme"] for row in rows] == ["euler", "heun"] * 2
     folders = {path.name for path in Path("out/runs").iterdir() if path.is_dir()}
     assert {row["run"] for row in rows if row["run"]} == folders
-
-
-@pytest.mark.usefixtures("runs_in_this_process")
-def test_a_checked_sweep_says_what_is_resolved_in_words_and_in_json(annelid: Command) -> None:
-    Path("study.toml").write_text(SHORT.replace("1.0, 1e4", "1.31, 1.4").replace("0.2", "1.0"))
-    words = ("sweep", "study.toml", "-o", "out", "--jobs", "1", "--check", "2")
-    done = annelid(*words)
-    assert done.exit_code == 0, done.err
-    assert done.out.splitlines()[-4] == "Checked 2 of 4 runs: all resolved."
-    assert "Checked" not in annelid(*words, "--quiet").out
-    results = json.loads(annelid(*words, "--json").out)["results"]
-    assert [row["check"] for row in results["sweep.csv"]] == ["resolved", None, None, "resolved"]
-    assert list(results["check"]) == ["0", "3"]
-    assert results["check"]["0"]["resolved"]
-    assert results["check"]["0"]["sentence"].startswith("Resolved: with half the step (0.5 ms)")
 
 
 def test_the_example_is_a_study_that_runs_after_its_first_line(annelid: Command) -> None:

@@ -186,6 +186,11 @@ REFUSED: dict[str, tuple[Change, dict[str, object], str]] = {
     "a clock that is too coarse": (lambda log: log.assign(t_ms=log["t_ms"] // 100 * 100), {}, "repeat the time"),
     "no such column": (lambda log: log.drop(columns="s3_mm"), {}, "no column 's3_mm': .*s1_mm"),
     "no time": (lambda log: log.drop(columns="t_ms"), {}, "no column 't_ms'"),
+    "a time without a unit": (
+        lambda log: log.rename(columns={"t_ms": "t"}),
+        {"time": "t"},
+        "_s, or write time_unit = .s",
+    ),
     "a column twice": (lambda log: log.rename(columns={"s3_mm": "s1_mm"}), {}, "two columns 's1_mm'"),
     "mostly gaps": (lambda log: with_cells(log, "s1_mm", slice(100, 800), np.nan), {}, "no number in 8. %"),
     "too short": (lambda log: log.iloc[:12], {}, "too short to compare"),

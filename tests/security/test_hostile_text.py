@@ -221,9 +221,9 @@ def test_networks_are_drawn_with_any_names(tmp_path: Path) -> None:
     network.add_neuron(HOSTILE, Neuron())
     network.add_input(HOSTILE, HOSTILE)
     svg = network_svg(network)
+    assert CONTROL.search(svg) is None
     ET.fromstring(svg)
     ET.parse(network_figure(network, tmp_path / "network.svg"))
-    assert all(CONTROL.search(text) is None for text in (svg, network.table()))
 
 
 def test_an_exported_view_shows_the_name_and_loads_nothing(tmp_path: Path) -> None:

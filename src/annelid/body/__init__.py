@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from annelid.body.actuation import crossing_site, ring_names, stretch_sensors
     from annelid.body.actuators import ActuatorKind
     from annelid.body.actuators.muscle import Rings, muscle_force
-    from annelid.body.actuators.servo import ServoRings, motor_power_W, wrap_factors
+    from annelid.body.actuators.servo import ServoRings, wrap_factors
     from annelid.body.assemble import build_spec, compile_spec
     from annelid.body.estimates import bearable_force_N, rhombus_of
     from annelid.body.formulations import FormulationKind
@@ -40,7 +40,6 @@ __all__ = [
     "build_spec",
     "compile_spec",
     "crossing_site",
-    "motor_power_W",
     "muscle_force",
     "rhombus_of",
     "ring_names",

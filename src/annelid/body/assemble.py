@@ -136,11 +136,6 @@ def mjcf_text(config: RunConfig, keyframes: Sequence[Mapping[str, Any]] = ()) ->
             "body.strands: stiffness that differs along rods cannot be written as MJCF, where a rod has one: take "
             "body.formulation.kind = 'chain', or run the worm with annelid"
         )
-    if body.heading_deg:
-        raise ConfigError(
-            f"body.heading_deg = {body.heading_deg:g} cannot be written as MJCF, whose keyframes lack the "
-            "frames of turned rods: set it to 0, or run the worm with annelid"
-        )
     # The springs that annelid senses, by the names under which it drives a robot of one's own.
     for segment, springs in enumerate(stretch_sensors(body.geometry(), body.springs)):
         for number, spring in enumerate(springs):

@@ -203,10 +203,26 @@ def config_of(
     if segments is not None:
         overrides |= {load_config(source).body.segments_field: segments}
     config = load_config(source, overrides, fidelity=fidelity, arena=arena)
+    _say_unchanged(config, overrides, source, fidelity, arena)
     if preset is None and refitting:
         fitted = f"{FIRST_PRESET} is fitted to three segments, its mesh and its step"
         complain(f"{refitting[0]} without a preset takes {RIGID_PRESET}: {fitted}")
     return config
+
+
+def _say_unchanged(config: RunConfig, overrides: Mapping[str, Any], source: str, *options: str | None) -> None:
+    """Says which fields were set to the value that they have without it."""
+    from annelid.config import field_value, fields_of, load_config, toml_value, whole_path
+
+    if not overrides:
+        return
+    fidelity, arena = options
+    without = load_config(source, fidelity=fidelity, arena=arena)
+    for path in (whole_path(given, config.model_dump()) for given in overrides):
+        if path in fields_of(config) and path in fields_of(without):
+            value = field_value(config, path)
+            if value == field_value(without, path):
+                complain(f"note: {path} = {toml_value(value)} changes nothing: {source} has this value")
 
 
 def names_worm(source: str) -> bool:

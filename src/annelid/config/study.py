@@ -33,6 +33,9 @@ class Vary(Section):
     number: Annotated[int, Field(ge=2, le=MOST_RUNS)] | None = Field(
         default=None, description="values of a range that a grid takes, both ends among them"
     )
+    follow: Mapping[str, float] = Field(
+        default_factory=dict, description="other fields, each with the ratio to this one that it keeps"
+    )
 
     @model_validator(mode="after")
     def _says_one_thing(self) -> Self:
@@ -40,6 +43,8 @@ class Vary(Section):
         ways = sum((self.values is not None, self.choices is not None, is_range))
         if ways != 1:
             raise ValueError(f"vary {self.field!r} says {'nothing' if not ways else 'two things'} to take: {HOW}")
+        if self.follow and self.choices is not None:
+            raise ValueError(f"vary {self.field!r}: follow needs numbers, values = [..] or from and to, not choices")
         listed = self.values if self.values is not None else self.choices
         if listed is not None:
             if self.log or self.number is not None:

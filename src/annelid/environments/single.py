@@ -109,8 +109,8 @@ class WormEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.layout: Layout = layout_of(worm)
         self.observation_space = self.layout.space()
         self.action_space = Box(0.0, 1.0, (worm.n_muscles,), np.float32)
-        body, ground = body_and_arena(task.config)
-        self._route = Route(ground, body.heading_deg)
+        _, ground = body_and_arena(task.config)
+        self._route = Route(ground)
         geometry = worm.geometry
         self._weight_N = worm.total_mass_kg * STANDARD_GRAVITY_M_PER_S2
         self._begin(np.zeros(worm.n_muscles))

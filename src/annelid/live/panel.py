@@ -72,7 +72,8 @@ def plots_of(names: Sequence[str]) -> dict[str, Plot]:
     segments, others = by_segment(neurons)
     plots: dict[str, Plot] = {}
     if segments:
-        plots["half-centres"] = _half_centres(segments)
+        if (halves := _half_centres(segments)).curves:
+            plots["half-centres"] = halves
         for segment, neurons in segments.items():
             labels = [role_of(neuron) for neuron in neurons]
             plots[f"neurons of segment {segment}"] = _plot(f"segment {segment}: potentials (mV)", neurons, labels)

@@ -115,7 +115,10 @@ def player_of(source: RunConfig | Run, speed: float = 1.0) -> tuple[Player, Anat
     """
     body = source.config.body if isinstance(source, Run) else source.body
     if body.own_model is not None:
-        raise ConfigError(f"body.kind = {body.kind!r} cannot be viewed: use annelid run and annelid draw")
+        raise ConfigError(
+            f"body.kind = {body.kind!r} cannot be viewed: the live view draws the mesh of annelid's own worms, which a "
+            "robot from an MJCF file does not have; use annelid run, and annelid draw RUN --video robot.mp4"
+        )
     if not body.is_planar:
         worm_of(source.config if isinstance(source, Run) else source)
     if isinstance(source, Run):

@@ -81,13 +81,14 @@ def read_map(path: str | Path) -> LogMap:
     return read
 
 
-def unit_of(name: str, given: str | None, what: str) -> tuple[str, float]:
+def unit_of(name: str, given: str | None, what: str, example: str = "mm") -> tuple[str, float]:
     """Returns what a column measures, by its SI unit, and how many of these its unit is.
 
     Args:
         name: The column's name, which may end in the unit.
         given: The unit, where it is stated.
         what: What states it, for the error.
+        example: A unit that would fit, for the error.
 
     Raises:
         ConfigError: The unit is unknown, or there is none.
@@ -99,7 +100,8 @@ def unit_of(name: str, given: str | None, what: str) -> tuple[str, float]:
     if given:
         raise ConfigError(f"{what} = {shown(given)} is no known unit: it is one of {listed(list(UNITS))}")
     raise ConfigError(
-        f'the unit of column {shown(name)} is not known: end its name in one, as _mm, or write {what} = "mm"'
+        f"the unit of column {shown(name)} is not known: end its name in one, as _{example}, or write "
+        f'{what} = "{example}" in the map'
     )
 
 

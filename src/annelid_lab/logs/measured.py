@@ -169,7 +169,8 @@ def _instants(table: LogTable, log_map: LogMap) -> tuple[Array, np.ndarray]:
         raise ConfigError(f"{table.path} has no column {shown(log_map.time)}: {offered}")
     time_s = clock_times(log_map.time, table)
     if time_s is None:
-        kind, factor = unit_of(log_map.time, log_map.time_unit or table.units.get(log_map.time), "time_unit")
+        given = log_map.time_unit or table.units.get(log_map.time)
+        kind, factor = unit_of(log_map.time, given, "time_unit", example="s")
         if kind != "s":
             unit = log_map.time_unit or log_map.time
             raise ConfigError(f"time_unit = {shown(unit)} is no unit of time: s, ms, us or min")

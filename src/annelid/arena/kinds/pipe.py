@@ -10,7 +10,6 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from annelid.arena.centre_line import AHEAD, UP, Bore, Course, Curve, Straight
-from annelid.arena.kinds.floor import refuse_heading
 from annelid.arena.surface import Implicit, Level, Shape, grid_faces, lengths
 from annelid.config.run import ArenaKind, RunConfig
 from annelid.config.sections import NonNegative, Positive
@@ -90,7 +89,7 @@ class Pipe(ArenaKind):
         return PIPE_ABOVE_FLOOR_M
 
     def check_with(self, config: RunConfig) -> None:
-        """Checks that the worm leads along the pipe and fits into its entry."""
+        """Checks that the worm fits into its entry."""
         free, mesh = self.bore_m + self.entry_clearance_m, getattr(config.body, "mesh", None)
         if mesh is not None and free < max(mesh.radii_m):
             raise ValueError(
@@ -98,7 +97,6 @@ class Pipe(ArenaKind):
                 f"at least body.mesh.radius_m = {max(mesh.radii_m):g}, the worm that starts inside; make it narrower "
                 "further on with arena.profile"
             )
-        refuse_heading(config, f"arena.kind = {self.kind!r}")
 
     def ground(self) -> PipeWall:
         """Returns the inside of the wall."""

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from annelid.analysis.track import forward_position
-from annelid.draw.canvas import canvas, line_entries, line_looks, panel_title, save
+from annelid.draw.canvas import canvas, line_entries, line_looks, panel_title, plain, save
+from annelid.draw.figures.network_diagram import role_of
 from annelid.draw.plots import neuron_potentials
 from annelid.errors import RunFileError
 from annelid.protocols import Array
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MOST_ROWS = 6  # segments that get a panel: of more, as many from the first to the last, evenly spaced
+MOST_COLUMNS = 3  # of neurons without half-centres
 _CM = 100.0
 
 Values = Array | None  # one column per segment, ``(n_times, n_segments)``; None if they were not recorded
@@ -44,18 +46,30 @@ def lengths_figure(runs: Sequence[Run], labels: Sequence[str], path: Path) -> Pa
 def potentials_figure(runs: Sequence[Run], labels: Sequence[str], path: Path) -> Path:
     """Draws the potentials of each segment's half-centre: contraction neurons thick, expansion neurons thin.
 
+    Networks without half-centres get a column for each of the first neurons that every segment has.
+
     Args:
         runs: The runs.
         labels: A short name of each.
         path: File to write; its suffix chooses the format.
+
+    Raises:
+        RunFileError: None of the runs has neurons whose names end in the number of a segment.
     """
+    names = [str(name) for run in runs if "potential" in run.data for name in run.data["neuron"].values]
+    roles = dict.fromkeys(role for name in names if (role := role_of(name)) != name)
     panels: dict[str, Curves] = {
         "Half-centres, above rest (mV); thick: contraction, thin: expansion": lambda run: [
             (_potentials(run, "contraction"), 1.5),
             (_potentials(run, "expansion"), 0.7),
         ]
     }
-    return _over_time(runs, labels, panels, "potentials of half-centres", path)
+    if "contraction" not in roles:
+        panels = {
+            f"{plain(role)}, above rest (mV)": lambda run, role=role: [(_potentials(run, role), None)]
+            for role in [*roles][:MOST_COLUMNS]
+        }
+    return _over_time(runs, labels, panels, "neurons whose names end in the number of a segment, as motor_1", path)
 
 
 def travel_figure(runs: Sequence[Run], labels: Sequence[str], path: Path) -> Path:
@@ -96,6 +110,8 @@ def travel_figure(runs: Sequence[Run], labels: Sequence[str], path: Path) -> Pat
 
 def _over_time(runs: Sequence[Run], labels: Sequence[str], panels: Mapping[str, Curves], what: str, path: Path) -> Path:
     """Draws a column for each kind of curve, and in it a panel for each segment."""
+    if not panels:
+        raise RunFileError(f"none of these runs recorded {what}")
     curves = [[of(run) for of in panels.values()] for run in runs]
     drawn = [any(values is not None for column in of_run for values, _ in column) for of_run in curves]
     if not any(drawn):

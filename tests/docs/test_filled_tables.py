@@ -77,8 +77,6 @@ STALE: tuple[str, ...] = (
     "firmware.csv",
     "pipes.csv",
     "robustness_three_segments.json",
-    "slip.csv",
-    "tune_timed.csv",
     "weak_middle.csv",
 )
 """Result files whose worms have changed since: to be measured again."""

@@ -158,7 +158,7 @@ def test_what_is_no_study_is_refused_in_a_sentence(subtests: pytest.Subtests, tm
         ({"outputs": ["period_s"], "rank": "travel_m"}, "rank = 'travel_m': must be one of the outputs"),
         ({"rank": "contact_duty"}, "rank = 'contact_duty'"),
         ({"keep": "all"}, "keep = 'all': must be one of"),
-        ({"cluster": {"kind": "slurm"}}, "a study names no cluster any more: leave it out, and give --scheduler"),
+        ({"cluster": {"kind": "slurm"}}, "unknown field 'cluster'"),
         ({"vary": [{"field": "body.gain", "values": [-1.0, -2.0]}]}, "body.gain = -1.0"),
     ):
         with subtests.test(f"{fields!r:.60}"):

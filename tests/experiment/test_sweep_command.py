@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import csv
-import subprocess
-import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -66,11 +63,6 @@ def test_the_example_is_a_study_that_runs_after_its_first_line(annelid: Command)
     [
         ((), "name a study"),
         (("missing.toml",), "cannot read"),
-        (
-            ("study.toml", "--cluster", "slurm"),
-            "--cluster and ANNELID_CLUSTER are no more: leave them out",
-        ),
-        (("study.toml", "--scheduler", "here", "--jobs", "2"), "--jobs is for processes of this machine"),
         (("study.toml", "--samples", "8"), "has no effect on design = 'grid'"),
         (("study.toml", "-o", "study.toml"), "study.toml is a file"),
     ],
@@ -83,26 +75,3 @@ def test_bad_input_ends_in_one_sentence_before_anything_runs(
     assert done.exit_code == 2
     assert says in " ".join(done.err.split())
     assert [path.name for path in Path().iterdir()] == ["study.toml"]
-
-
-@pytest.mark.slow
-def test_the_workers_of_a_scheduler_compute_a_sweep(annelid: Command) -> None:
-    Path("study.toml").write_text(SHORT)
-    dask = [str(Path(sys.executable).with_name("dask"))]
-    address = ["--port", "0", "--dashboard-address", ":0", "--scheduler-file", "at.json"]
-    worker = ["worker", "--scheduler-file", "at.json", "--nthreads", "1", "--no-nanny", "--no-dashboard"]
-    with subprocess.Popen([*dask, "scheduler", *address]) as scheduler:
-        try:
-            while not Path("at.json").exists():
-                assert scheduler.poll() is None
-                time.sleep(0.1)
-            with subprocess.Popen([*dask, *worker]) as computing:
-                try:
-                    done = annelid("sweep", "study.toml", "-o", "out", "--scheduler", "at.json")
-                finally:
-                    computing.kill()
-        finally:
-            scheduler.kill()
-    assert done.exit_code == EXIT_SOME_FAILED, done.err
-    data = xr.load_dataset("out/sweep.nc", engine="h5netcdf")
-    assert data.status.values.tolist() == [["complete"] * 2, ["failed"] * 2]

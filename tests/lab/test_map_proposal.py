@@ -35,6 +35,12 @@ LOGS = {
         {"rate_Hz": 25, "m_per_px": 1e-3},
         {"head": ("travel", 1e-3 * TIMES_MS)},
     ),
+    "TRex": (
+        "frame,time_s,X#wcentroid (cm),Y#wcentroid (cm),missing\n"
+        + rows(TIMES_MS / 40, 1e-3 * TIMES_MS, 50.0 + 0.1 * TIMES_MS, 0 * TIMES_MS, 0 * TIMES_MS),
+        {},
+        {"wcentroid": ("travel", 1e-3 * TIMES_MS)},
+    ),
     "motion capture": (
         "Format Version,1.23,Capture Frame Rate,25.0,Length Units,Millimeters\nFrame,Time (Seconds),head.X,head.Y\n"
         + rows(TIMES_MS / 40, 1e-3 * TIMES_MS, TIMES_MS, 0 * TIMES_MS),

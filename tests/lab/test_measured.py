@@ -251,6 +251,18 @@ def test_a_tracked_point_travels_along_its_net_motion(run: Run, tmp_path: Path) 
     assert compared(run, tmp_path / "log.csv", **given_map).signals["head"].rms < 0.004
 
 
+def test_travel_counts_from_anywhere_and_one_that_goes_backward_is_noted(run: Run, tmp_path: Path) -> None:
+    log = log_of(run)
+    time, travel, _ = run_series(run, "travel")
+    log["x_mm"] = 509.3 + 1e3 * np.interp(log["t_ms"] / 1e3 + LAG_S, time, travel)
+    fields: dict[str, object] = {"map": {"x_mm": "travel"}, "lag_s": LAG_S}
+    found = agreement_of(run, log, tmp_path, **fields)
+    assert found.signals["x_mm"].rms < 1e-4
+    assert "backward" not in " ".join(found.notes)
+    found = agreement_of(run, log.assign(x_mm=-log["x_mm"]), tmp_path, **fields)
+    assert any("x_mm goes backward" in note for note in found.notes)
+
+
 def test_a_reference_that_is_none_is_refused(subtests: pytest.Subtests, run: Run) -> None:
     for reference, words in (
         ("stretch_lenght[1, left]", "no signal 'stretch_lenght'.*stretch_length"),

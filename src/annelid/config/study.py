@@ -11,13 +11,10 @@ from pydantic import Field, model_validator
 from annelid.config.checking import check_section
 from annelid.config.loading import seen_from
 from annelid.config.sections import Line, Section, Seed
-from annelid.errors import ConfigError, shown
 from annelid.textfiles import check_depth, read_toml
 
 Design = Literal["grid", "random", "lhs", "sobol"]
 MOST_RUNS = 100_000
-INSTEAD = "leave it out, and give --scheduler ADDRESS, or executor= in Python; docs/sweeps.md has Slurm"
-"""What replaced clusters that a study describes."""
 HOW = "give values = [..], choices = [..], or from, to and, in a grid, number"
 
 
@@ -121,6 +118,4 @@ def load_study(source: str | Path | Mapping[str, Any] | Study) -> Study:
         tree = {"name": Path(source).stem, **read_toml(Path(source), "the study")}
         if isinstance(preset := tree.get("preset"), str):
             tree["preset"] = seen_from(Path(source).parent, preset)
-    if "cluster" in tree:
-        raise ConfigError(f"cluster = {shown(tree['cluster'])}: a study names no cluster any more: {INSTEAD}")
     return check_section(Study, tree)

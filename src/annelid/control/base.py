@@ -218,31 +218,17 @@ class CallableController:
         """Does nothing: what keeps a state is a class of its own."""
 
     def step(self, sensation: Sensation) -> Array:
-        """Calls the function and checks what it returns.
+        """Calls the function; whoever steps a controller checks what it gives.
 
         Raises:
-            ConfigError: The activation is no number, has another shape, or leaves [0, 1].
+            ConfigError: The activation is no number.
         """
-        result, n, time_s = self._function(sensation), self._n_muscles, sensation.time_s
+        result = self._function(sensation)
         try:
             activation = np.array(result, dtype=np.float64)
         except (TypeError, ValueError):
             raise ConfigError(
-                f"the controller function returned {type(result).__name__} at {time_s:g} s; it must return {n} numbers "
-                "in [0, 1]"
+                f"the controller function returned {type(result).__name__} at {sensation.time_s:g} s; it must return "
+                f"{self._n_muscles} numbers in [0, 1]"
             ) from None
-        if activation.ndim == 0:
-            activation = np.full(n, activation)
-        if activation.shape != (n,):
-            raise ConfigError(
-                f"the controller function returned shape {activation.shape} at {time_s:g} s; it must return shape "
-                f"({n},)"
-            )
-        within = (activation >= 0.0) & (activation <= 1.0)
-        if not within.all():
-            worst = int(np.argmin(within))
-            raise ConfigError(
-                f"the controller function returned activation {activation[worst]:g} for muscle {worst + 1} at "
-                f"{time_s:g} s; it must lie in [0, 1]"
-            )
-        return activation
+        return activation if activation.ndim else np.full(self._n_muscles, activation)

@@ -79,8 +79,8 @@ def variables_of(varied: Sequence[Vary], base: RunConfig) -> list[Variable]:
 
 def _variable(vary: Vary, base: RunConfig) -> Variable:
     field = whole_path(vary.field, base.model_dump())
-    # A field of another kind than the configuration's counts: the kind may be varied, too.
-    if field not in field_paths():
+    # A field of another kind than the configuration's counts: the kind may be varied, too. So does an entry of a table.
+    if field not in field_paths() and not any(field.startswith(f"{path}.") for path in fields_of(base)):
         raise ConfigError(f"vary: unknown field {vary.field!r}: {suggest(field, fields_of(base))}")
     present = field_value(base, field) if field in fields_of(base) else None
     whole = isinstance(present, int) and not isinstance(present, bool)

@@ -24,9 +24,9 @@ from rich.table import Table
 
 from annelid.analysis import NUMBERS, Number
 from annelid.config import RunConfig, Study, Vary, field_paths, load_config, load_study, toml_value, unit_of
-from annelid.config.study import INSTEAD, MOST_RUNS
+from annelid.config.study import MOST_RUNS
 from annelid.draw.figures.sweep import sweep_figure, worded
-from annelid.errors import ConfigError, shown, suggest
+from annelid.errors import ConfigError, suggest
 from annelid.experiment.case import Case
 from annelid.experiment.executors import workers
 from annelid.experiment.progress import StudyProgress
@@ -171,7 +171,7 @@ class Sweep:
         meanings = field_paths()
         for i, field in enumerate(plan.fields):
             dim, values = (field, levels[field]) if field in levels else (SAMPLE, [row[i] for row in plan.samples])
-            attrs = {"units": unit_of(field) or "1", "long_name": meanings[field] or field}
+            attrs = {"units": unit_of(field) or "1", "long_name": meanings.get(field) or field}
             coords[field] = (dim, _column(values), attrs)
         return xr.Dataset(
             variables,
@@ -207,7 +207,6 @@ def sweep(
     executor: Executor | None = None,
     jobs: int | None = None,
     progress: StudyProgress | None = None,
-    cluster: object = None,
 ) -> xr.Dataset:
     """Computes a sweep, writes its results, and returns them.
 
@@ -219,7 +218,6 @@ def sweep(
         executor: Who computes the runs; None for processes of this machine.
         jobs: How many processes, by default one a core.
         progress: Called at the start and after every run.
-        cluster: Replaced by ``executor``, and refused.
 
     Returns:
         Every number of summary and gait with ``units`` and ``long_name``: along the varied fields of a grid, or along
@@ -232,8 +230,6 @@ def sweep(
         RunFileError: A file cannot be written.
         KeyboardInterrupt: Finished runs are kept.
     """
-    if cluster is not None:
-        raise ConfigError(f"cluster = {shown(cluster)}: clusters have no names any more: {INSTEAD}")
     with workers(executor, jobs) as given:
         done = swept(load_study(study), Path(folder), executor=given, progress=progress)
     write_results(done)

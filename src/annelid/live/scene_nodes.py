@@ -23,7 +23,8 @@ from annelid.draw.camera import FIELD_OF_VIEW_DEG, fitting_distance, picture_axe
 from annelid.draw.drawn_worm import upright
 from annelid.draw.scene import ROOM
 from annelid.live.history import Moment
-from annelid.live.lines_and_arrows import CONTACT_COLOR, Painter, PlanarPainter
+from annelid.live.lines_and_arrows import CONTACT_COLOR, PlanarPainter
+from annelid.live.player import AnyPainter
 from annelid.live.scene_geoms import SceneGeoms
 from annelid.morphology import Array
 
@@ -62,9 +63,7 @@ class Stage:
         follow: Whether worm and ground move so that the worm's middle stays on the screen.
     """
 
-    def __init__(
-        self, server: viser.ViserServer, config: RunConfig, painter: Painter | PlanarPainter, moment: Moment
-    ) -> None:
+    def __init__(self, server: viser.ViserServer, config: RunConfig, painter: AnyPainter, moment: Moment) -> None:
         """Makes all nodes and places the camera so that the whole worm is seen."""
         from viser.transforms import SO3
 
@@ -98,8 +97,9 @@ class Stage:
         if config.arena is not None:
             _add_ground(scene, config.arena, float(np.ptp(first.strands[..., 0])))
         self._geoms: SceneGeoms | None = None
-        if isinstance(painter, Painter):
-            self._geoms = SceneGeoms(scene, f"{_ROOT}/ground", painter.model, Shape(*_squares(0.0)), _FLOOR_LOOK)
+        if not isinstance(painter, PlanarPainter):
+            floor = Shape(*_squares(0.0))
+            self._geoms = SceneGeoms(scene, f"{_ROOT}/ground", painter.model, floor, _FLOOR_LOOK, painter.prefix)
         self._place_geoms()
         self._first_middle = first.middle
         self._level = config.arena is not None and config.arena.is_plane and config.arena.slope_rad == 0.0
@@ -132,7 +132,7 @@ class Stage:
             self._root.position = shift
 
     def _place_geoms(self) -> None:
-        if self._geoms is not None and isinstance(self._painter, Painter):
+        if self._geoms is not None and not isinstance(self._painter, PlanarPainter):
             self._geoms.place(*self._painter.places(self._geoms.geoms))
 
     def set_visible(self, layer: str, visible: bool) -> None:

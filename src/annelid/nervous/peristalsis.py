@@ -13,7 +13,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from functools import cached_property
 
-from annelid.errors import ConfigError, require_at_least, require_positive
+from annelid.errors import ConfigError, require_positive
 from annelid.nervous.half_centre import HalfCentre, add_half_centre, add_hold
 from annelid.nervous.network import Network
 from annelid.nervous.neurons import Neuron
@@ -122,7 +122,11 @@ def peristalsis_network(n_segments: int, parameters: PeristalsisParameters | Non
     Raises:
         ConfigError: Fewer than 3 segments, or parameters that give a negative conductance.
     """
-    require_at_least(3, n_segments=n_segments)
+    if n_segments < 3:
+        raise ConfigError(
+            f"n_segments must be at least 3, not {n_segments}, for a network whose segments take turns: drive fewer by "
+            "the clock, with controller.kind = 'timed'"
+        )
     p, segments = parameters or PeristalsisParameters(), range(1, n_segments + 1)
     g, network = p.conductances, Network(f"peristalsis of {n_segments} segments")
     for segment in segments:

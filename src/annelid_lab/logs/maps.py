@@ -36,9 +36,18 @@ class Column(Section):
     )
     scale: float | None = Field(default=None, description="SI units of the signal in one of the column's, as m per rad")
     offset: float | Literal["free"] = Field(
-        default=0.0, description="added to the column, in the signal's SI unit; free: means are made equal"
+        default=0.0,
+        description="added to the column, in the signal's SI unit; free, also of travel: means are made equal",
     )
     distance_to: Line | None = Field(default=None, description="another tracked point: the column is their distance")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _from_any_place(cls, given: object) -> object:
+        """Frees the offset of travel, since a log may count places from anywhere."""
+        if not isinstance(given, Mapping) or given.get("signal") != "travel":
+            return given
+        return {"offset": "free", **given}
 
 
 class LogMap(Section):

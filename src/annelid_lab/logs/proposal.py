@@ -8,7 +8,7 @@ from pathlib import Path
 
 from annelid.textfiles import toml_value
 from annelid_lab.logs.maps import UNIT_AT_END, UNITS, plain_unit
-from annelid_lab.logs.measured import clock_times, points_of
+from annelid_lab.logs.measured import clock_times, point_in, points_of
 from annelid_lab.logs.tables import LogTable, read_table
 
 _SPELT_OUT = {"seconds": "s", "milliseconds": "ms", "meters": "m", "centimeters": "cm", "millimeters": "mm"}
@@ -19,7 +19,6 @@ _SEGMENT = re.compile(
 )
 _TRAVEL = re.compile(r"travel|distance|displacement|forward", re.IGNORECASE)
 _SIDES = {"l": "left", "left": "left", "r": "right", "right": "right"}
-_POINT = re.compile(r"(?:.+[.:])?(.+?)[._: ]x(?:[_ (\[]+[A-Za-zµμ]+[)\]]?)?", re.IGNORECASE)
 _RATE = re.compile(r"(?:frame rate|frequency|fps)\W+(\d+(?:\.\d+)?)|^Trajectories\s+(\d+(?:\.\d+)?)", re.IGNORECASE)
 _LENGTH_UNIT = re.compile(r"length units\W+(meters|centimeters|millimeters)", re.IGNORECASE)
 
@@ -120,16 +119,16 @@ def _names_in(names: Sequence[str]) -> int:
     """How good a header is: texts that differ, and coordinates that have the names of their points."""
     if len(set(names)) < len(names):
         return 0
-    return sum(bool(re.search(r"[^\W\d]", name)) + bool(_POINT.fullmatch(name)) for name in names)
+    return sum(bool(re.search(r"[^\W\d]", name)) + bool(point_in(name)) for name in names)
 
 
 def _points_in(table: LogTable) -> dict[str, tuple[list[str], str | None]]:
     """Tracked points: the individuals that have each, and its unit where a column or a row of units says so."""
     found: dict[str, tuple[list[str], str | None]] = {}
-    for match in filter(None, map(_POINT.fullmatch, table.names)):
-        if match[1] not in found and (axes := points_of(match[1], table.names)):
+    for point in dict.fromkeys(filter(None, map(point_in, table.names))):
+        if axes := points_of(point, table.names):
             _, unit, is_stated = _split_unit(next(iter(axes.values()))["x"], table)
-            found[match[1]] = sorted(axes), unit if is_stated else None
+            found[point] = sorted(axes), unit if is_stated else None
     return found
 
 

@@ -23,7 +23,6 @@ from annelid.cli import (
     Output,
     Quiet,
     ResultsFolder,
-    SchedulerAddress,
     config_of,
     kept_runs,
     lock,
@@ -59,15 +58,12 @@ class Study:
             "output": (Output, Path(self.output or self.name)),
             "quick": (Annotated[bool, typer.Option("--quick", help=words["quick"])], False),
             "jobs": (Jobs, None),
-            "scheduler": (SchedulerAddress, None),
             "quiet": (Quiet, False),
         }
 
-        def run(
-            output: Path, quick: bool, jobs: int | None, scheduler: str | None, quiet: bool, **further: Any
-        ) -> None:
+        def run(output: Path, quick: bool, jobs: int | None, quiet: bool, **further: Any) -> None:
             compute = getattr(import_module(f"annelid_studies.{self.module}"), self.function)
-            with kept_runs(output, jobs=jobs, scheduler=scheduler, quiet=quiet) as store:
+            with kept_runs(output, jobs=jobs, quiet=quiet) as store:
                 written, tables = compute(store, output, "quick" if quick else "full", **further)
             print_results(written, *tables, quiet=quiet)
 

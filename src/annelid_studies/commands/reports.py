@@ -15,7 +15,6 @@ from annelid.cli import (
     Output,
     Quiet,
     ResultsFolder,
-    SchedulerAddress,
     command,
     end_study,
     going_on,
@@ -40,7 +39,6 @@ def paper_command(
         typer.Option(metavar="NAME", help="Only the main numbers and this examination; may be repeated."),
     ] = None,
     jobs: Jobs = None,
-    scheduler: SchedulerAddress = None,
     claims: Annotated[
         Path | None, typer.Option(metavar="FILE.md", help="Also write the table of claims as Markdown.")
     ] = None,
@@ -69,7 +67,7 @@ def paper_command(
         claims = with_suffix(claims, (".md",), "Markdown", default=".md")
         if not claims.parent.is_dir():
             raise RunFileError(f"{claims} cannot be written: there is no folder {claims.parent}")
-    with kept_runs(output, jobs=jobs, scheduler=scheduler, quiet=quiet) as store:
+    with kept_runs(output, jobs=jobs, quiet=quiet) as store:
         effort = "quick" if quick else "full"
         report = reproduce(output, effort, only=only or None, executor=store.executor, progress=store.progress)
         html = write_report(report, output)
@@ -142,7 +140,6 @@ def robustness_command(
         list[str] | None, typer.Option(metavar="KIND", help="Only this one; may be repeated.  [default: all four]")
     ] = None,
     jobs: Jobs = None,
-    scheduler: SchedulerAddress = None,
     quiet: OnlyPaths = False,
 ) -> None:
     """Compare how often controllers make different worms walk.
@@ -163,7 +160,7 @@ def robustness_command(
     """
     from annelid_studies.robustness import CONTROLLERS, robustness, shares, shares_table
 
-    with kept_runs(output, jobs=jobs, scheduler=scheduler, quiet=quiet) as store:
+    with kept_runs(output, jobs=jobs, quiet=quiet) as store:
         judged = robustness(
             output,
             points,
@@ -212,7 +209,6 @@ def challenge_command(
     ] = None,
     output: Output = Path("challenge"),
     jobs: Jobs = None,
-    scheduler: SchedulerAddress = None,
     quiet: Quiet = False,
 ) -> None:
     """Rank controllers in a benchmark of crawling.
@@ -244,7 +240,7 @@ def challenge_command(
     duration_s = tasks.QUICK_DURATION_S if quick else None
     found = tasks.find_entrants(entrants or [])
     wanted = tasks.entries(found, task or [], seeds, finer=finer, duration_s=duration_s)
-    with kept_runs(output, jobs=jobs, scheduler=scheduler, quiet=quiet) as store:
+    with kept_runs(output, jobs=jobs, quiet=quiet) as store:
         scores = challenge(store, wanted, earlier)
     ranked = standings(scores)
     taus = [agreement(mean_speeds(scores), other) for other in others]

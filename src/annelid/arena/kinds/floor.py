@@ -13,16 +13,23 @@ from annelid.config.answers import Post, Walls
 from annelid.config.run import ArenaKind
 from annelid.config.sections import NonNegative, Positive
 
+Slope = Annotated[
+    float,
+    Field(
+        ge=-60,
+        le=60,
+        description="how steeply it rises towards -x, where the worm leads at the start; the model's axes lie in "
+        "the slope",
+    ),
+]
+"""Angle of an arena's axes, degrees."""
+
 
 class Ground(ArenaKind):
     """What floors and reliefs have in common; it lies along x."""
 
     floor_gap_m: NonNegative = Field(default=0.009, description="distance of the floor below the mesh's lowest line")
-    slope_deg: Annotated[float, Field(ge=-60, le=60)] = Field(
-        default=0.0,
-        description="how steeply it rises towards -x, where the worm leads at the start; the model's axes lie in "
-        "the slope",
-    )
+    slope_deg: Slope = 0.0
 
     @property
     def slope_rad(self) -> float:

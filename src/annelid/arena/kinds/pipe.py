@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from annelid.arena.centre_line import AHEAD, UP, Bore, Course, Curve, Straight
+from annelid.arena.kinds.floor import Slope
 from annelid.arena.surface import Implicit, Level, Shape, grid_faces, lengths
 from annelid.config.run import ArenaKind, RunConfig
 from annelid.config.sections import NonNegative, Positive
@@ -62,6 +63,7 @@ class Pipe(ArenaKind):
     narrowest_m: Positive = Field(default=0.13, description="radius of the narrowest bore of a taper or an hourglass")
     profile_start_m: NonNegative = Field(default=0.2, description="where the bore begins to narrow")
     profile_length_m: Positive = Field(default=0.5, description="length over which it changes")
+    slope_deg: Slope = 0.0
 
     @model_validator(mode="after")
     def _a_pipe_that_can_be(self) -> Self:
@@ -82,6 +84,11 @@ class Pipe(ArenaKind):
         if self.course == "helix" and turn_deg > 270 and self.pitch_m <= 2.2 * widest:
             refuse("pitch_m", f"must be more than {2.2 * widest:g} for turns that lie above each other")
         return self
+
+    @property
+    def slope_rad(self) -> float:
+        """As `slope_deg`, in rad."""
+        return radians(self.slope_deg)
 
     @property
     def floor_depth_m(self) -> float:

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 import annelid
 from annelid.config import Study, load_study
 from annelid.errors import ConfigError
-from annelid.experiment.search_space import spread_evenly, unit_samples
+from annelid.experiment.search_space import spread_evenly
 from annelid.experiment.sweep import (
     Plan,
     Sweep,
@@ -96,15 +96,6 @@ def test_samples_keep_to_their_ranges_and_choices(design: str, n: int, seed: int
         assert n_segments in (3, 4, 5, 6)
         assert isinstance(n_segments, int)
         assert scheme in ("euler", "heun")
-
-
-@settings(max_examples=15)
-@given(n=st.integers(1, 60), p=st.integers(1, 6), seed=st.integers(0, 2**32 - 1))
-def test_a_latin_hypercube_has_one_sample_in_every_stratum_of_every_variable(n: int, p: int, seed: int) -> None:
-    shares = unit_samples("lhs", n, p, seed)
-    assert shares.shape == (n, p)
-    for column in shares.T:
-        assert sorted(np.floor(column * n).astype(int).tolist()) == list(range(n))
 
 
 def test_fields_may_be_nested_and_lack_their_units() -> None:

@@ -21,7 +21,6 @@ from typer.testing import CliRunner
 
 from annelid.cli import app
 from annelid.config import load_config
-from annelid.draw.canvas import canvas, panel_title, save
 from annelid.draw.figures.network_diagram import network_figure, network_svg
 from annelid.draw.figures.sweep import sweep_figure
 from annelid.errors import AnnelidError, ConfigError
@@ -199,12 +198,6 @@ def test_tables_hold_no_formulas(tmp_path: Path) -> None:
     assert rows[0] == ["'=A1", "b"]
     kept = ["-1.5", "+2e3", "-", "-1.5", "", "\\u001b[2J"]
     assert [row[0] for row in rows[1:]] == ["'=cmd|' /C calc'!A0", "'@SUM(1)", "'+1+1", "'-2+3", *kept]
-
-
-def test_figures_show_names_as_they_are(tmp_path: Path) -> None:
-    with canvas(2.0) as figure:
-        panel_title(figure.subplots(), HOSTILE)
-        ET.parse(save(figure, tmp_path / "figure.svg"))
 
 
 def test_a_sweep_over_names_is_drawn(tmp_path: Path) -> None:

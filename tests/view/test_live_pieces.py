@@ -12,7 +12,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from annelid.config import load_config, preset_names
-from annelid.draw.scene import Skeleton
 from annelid.errors import ConfigError, RunFileError
 from annelid.live.history import History, Moment, history_of
 from annelid.live.lines_and_arrows import Painter
@@ -59,14 +58,6 @@ def test_a_refusal_is_shown_until_something_is_requested_again() -> None:
     requests.add(met.append, 2)
     requests.meet()
     assert (requests.notice, met) == ("", [1, 2])
-
-
-@pytest.mark.parametrize("preset", ["riddle2023-rods", "riddle2023"])
-def test_strands_at_rest_lie_where_the_mesh_is(preset: str) -> None:
-    anatomy = compile_worm(load_config(preset))
-    vertices, crossing = Skeleton(anatomy).locate(anatomy.model.qpos0)
-    np.testing.assert_allclose(vertices, anatomy.geometry.vertices_m, atol=1e-12)
-    np.testing.assert_allclose(crossing, anatomy.geometry.crossings_m, atol=1e-12)
 
 
 def test_a_picture_has_every_part() -> None:

@@ -170,11 +170,11 @@ class WormEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         weights, per_length_and_s = task.weights, 1.0 / (length_m * task.interval_s)
         effort = 0.0 if stopped else float(np.mean(self._activation * self._activation))
         terms = {
-            "reward_progress": weights.progress * ((now.place.along_m - before.place.along_m) * per_length_and_s),
-            "reward_effort": 0.0 - weights.effort * effort,
-            "reward_slip": 0.0 - weights.slip * ((now.slid_m - before.slid_m) * per_length_and_s),
-            "reward_success": weights.success * float(passed),
-            "reward_failure": 0.0 - weights.failure * float(bool(stopped)),
+            "reward_progress": weights["progress"] * ((now.place.along_m - before.place.along_m) * per_length_and_s),
+            "reward_effort": 0.0 - weights["effort"] * effort,
+            "reward_slip": 0.0 - weights["slip"] * ((now.slid_m - before.slid_m) * per_length_and_s),
+            "reward_success": weights["success"] * float(passed),
+            "reward_failure": 0.0 - weights["failure"] * float(bool(stopped)),
         }
         info = {
             **terms,

@@ -215,6 +215,8 @@ def _header(head: Sequence[Names], score: Score, path: Path) -> tuple[int, int, 
         own = [cell.strip() for cell in row]
         if own and own[0][:1] in ("#", "%"):
             own = [own[0].lstrip("#% "), *own[1:]] if own[0].lstrip("#% ") else own[1:]
+        if all(_NUMBER.fullmatch(cell) for cell in own):
+            continue
         above = [_filled(other) for other in reversed(head[max(place - 5, 0) : place]) if len(other) == len(row)]
         # The row alone, below one other, or below two neighbours, as individuals over points.
         for rows in ((), *((one,) for one in above), *zip(above[1:], above, strict=False)):

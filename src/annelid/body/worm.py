@@ -184,9 +184,9 @@ class WormBody(MeshBody):
         if time_s > LONGEST_BUILD_S:
             raise ValueError(
                 f"body.mesh.n_segments = {mesh.n_segments}, body.mesh.n_helices = {mesh.n_helices} and "
-                f"body.mesh.elements_per_side = {mesh.elements_per_side} make {elements:,} elements, which take about "
-                f"{time_s:,.0f} s and {memory_GB:,.1f} GB to build; at most {LONGEST_BUILD_S:g} s are allowed: lower "
-                "one of them"
+                f"body.mesh.elements_per_side = {mesh.elements_per_side} make {elements:,} elements. They take "
+                f"{time_s:,.0f} s and {memory_GB:,.1f} GB to build, and {LONGEST_BUILD_S:g} s are allowed: lower one "
+                "of them"
             )
         return self
 

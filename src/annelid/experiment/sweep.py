@@ -265,7 +265,7 @@ def chosen_numbers(names: Sequence[str], rank: str | None) -> tuple[Number, ...]
     scalars = [number.name for number in chosen if not number.per_segment]
     if rank is not None and rank not in scalars:
         raise ConfigError(
-            f"rank = {rank!r}: must be one of the outputs with one number a run: {suggest(rank, scalars)}"
+            f"rank = {rank!r}: must be one of the outputs with one number per run: {suggest(rank, scalars)}"
         )
     return chosen
 

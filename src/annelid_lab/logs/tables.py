@@ -413,7 +413,7 @@ def _equally_long(found: Mapping[str, object], path: Path) -> DataFrame:
         matrix = next((name for name, one in arrays.items() if one.ndim == 2), None)
         found_one = f"{shown(matrix)} is a matrix without names: " if matrix else ""
         raise UnreadableText(
-            f"{path} has no vector of numbers: {found_one}save each column as a variable of its own, as in "
+            f"{path} has no vector of numbers: {found_one}save each column as its own variable, as in "
             "t = data(:, 1), or a table T as S = table2struct(T, 'ToScalar', true)"
         )
     return DataFrame({name: one.astype(float) for name, one in vectors.items() if len(one) == longest})

@@ -122,7 +122,6 @@ def run_command(
     annelid run wang --uncertainty 8 --uncertainty-from mine/calibration.json
     """
     from annelid.config import load_config
-    from annelid.draw.gallery import draw_all
     from annelid.plausibility import refuse_nonsense
     from annelid.simulation.loop import simulate
     from annelid.simulation.runfile import FILE_NAME, open_run
@@ -196,6 +195,9 @@ def run_command(
         from annelid.experiment.uncertainty import uncertainty_table, write_uncertainty
 
         print_results(write_uncertainty(result), uncertainty_table(result), quiet=quiet)
+    # Only now: what draws is not to be loaded before the table.
+    from annelid.draw.gallery import draw_all
+
     print_paths(draw_all(done, folder, video=video, quiet=quiet, complain=complain))
     if result is not None:
         failed, stopped = (sum(one.status == status for *_, one in result.runs) for status in ("failed", "stopped"))

@@ -230,7 +230,7 @@ def test_a_run_comes_to_its_table_without_what_only_pictures_and_studies_need(tm
         [sys.executable, "-c", program], capture_output=True, text=True, check=False, timeout=120, env=quiet
     )
     assert done.returncode == 0, done.stderr
-    assert "quantity" in done.stdout
+    assert "this run" in done.stdout
 
 
 ROOMS = ["annelid", *sorted(f"annelid.{path.parent.name}" for path in SOURCE.glob("*/__init__.py"))]

@@ -5,5 +5,6 @@ from annelid_studies import faults as faults
 from annelid_studies import oscillators as oscillators
 from annelid_studies import planar as planar
 from annelid_studies import pressure as pressure
+from annelid_studies import waiting as waiting
 
 add_presets("annelid_studies")

@@ -74,12 +74,8 @@ STALE: tuple[str, ...] = (
     "challenge_tune_5ms.csv",
     "challenge_wave_2ms.csv",
     "challenge_wave_5ms.csv",
-    "firmware.csv",
     "pipes.csv",
-    "riddle2025.csv",
     "robustness_three_segments.json",
-    "slip.csv",
-    "tune_timed.csv",
     "weak_middle.csv",
 )
 """Result files whose worms have changed since: to be measured again."""

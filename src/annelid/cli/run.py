@@ -24,6 +24,7 @@ from annelid.cli.common import (
     print_paths,
     print_results,
     print_run,
+    print_worm,
 )
 from annelid.cli.entry import EXIT_INTERRUPTED, command, complain, end_study, lock
 from annelid.cli.json_output import wants_json
@@ -143,7 +144,7 @@ def run_command(
     if network is not None:
         overrides |= {"controller.kind": "network", "controller.text": read_text(network, "the network")}
     if resume is None:
-        config = config_of(preset, overrides, segments, fidelity, arena, uncertainty)
+        config = config_of(preset, overrides, segments, fidelity, arena)
     elif (preset, segments, fidelity, arena, network) == (None,) * 5:
         config = load_config(open_run(resume).config.model_dump(), overrides)
     else:
@@ -153,6 +154,7 @@ def run_command(
     for doubt in refuse_nonsense(config):
         complain(f"warning: {doubt}")
     folder = locked_folder(out, config.name)
+    print_worm(config, quiet=quiet)
     result, checked = None, None
     try:
         if check or uncertainty is not None:
@@ -190,13 +192,17 @@ def run_command(
     if done.status == "interrupted":
         complain(f"interrupted: what was computed is in {done.path}; continue it with: annelid run --resume {folder}")
         raise typer.Exit(EXIT_INTERRUPTED)
-    if not wants_json():
-        typer.echo(done.path)
+    if quiet and not wants_json():
+        print_paths([done.path])
     if result is not None:
         from annelid.experiment.uncertainty import uncertainty_table, write_uncertainty
 
         print_results(write_uncertainty(result), uncertainty_table(result), quiet=quiet)
-    print_paths(draw_all(done, folder, video=video, quiet=quiet, complain=complain))
+    drawn = draw_all(done, folder, video=video, quiet=quiet, complain=complain)
+    if quiet or wants_json():
+        print_paths(drawn)
+    else:
+        typer.echo(f"files in {folder}: {' '.join(path.name for path in (done.path, *drawn))}")
     if result is not None:
         failed, stopped = (sum(one.status == status for *_, one in result.runs) for status in ("failed", "stopped"))
         end_study(len(result.runs), failed, folder / "uncertainty.json", stopped=stopped)

@@ -86,10 +86,10 @@ class Check:
         return not self.unresolved and not self.differences
 
     def cell(self, name: str) -> str:
-        """Says how far a number moves, for a table; empty where it was not compared."""
+        """Says how far a number moves, with ! if it is not resolved, for a table; empty where it was not compared."""
         if name not in self.moved:
             return ""
-        return percent(self.largest(name)) + ("\nnot resolved" if self.largest(name) > RESOLVED else "")
+        return percent(self.largest(name)) + (" !" if self.largest(name) > RESOLVED else "")
 
     @property
     def faults(self) -> list[str]:

@@ -22,7 +22,7 @@ import pandas as pd
 import xarray as xr
 from rich.table import Table
 
-from annelid.analysis import NUMBERS, Number
+from annelid.analysis import NUMBERS, Number, three_digits
 from annelid.config import RunConfig, Study, Vary, field_paths, load_config, load_study, toml_value, unit_of
 from annelid.config.study import MOST_RUNS
 from annelid.draw.figures.sweep import sweep_figure, worded
@@ -409,7 +409,7 @@ def results_table(sweep: Sweep) -> Table:
         order = numbers.dropna(subset=names[:1]).sort_values(names[0], ascending=False, kind="stable").index
         for rows in [order] if len(order) <= 2 * N_ENDS else [order[:N_ENDS], order[-N_ENDS:]]:
             for i in rows:
-                values = ("" if np.isnan(value) else f"{value:.4g}" for value in numbers.loc[i])
+                values = ("" if np.isnan(value) else three_digits(float(value)) for value in numbers.loc[i])
                 table.add_row(str(i), *sweep.rows.loc[i, varied], *values)
             table.add_section()
     return table

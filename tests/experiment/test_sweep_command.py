@@ -50,7 +50,8 @@ def test_a_check_says_which_runs_are_resolved_in_rows_words_and_json(
     annelid: Command, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Of three complete runs the first and the last are checked; half the step moves them by 1 % and by 5 %."""
-    monkeypatch.setattr("annelid.experiment.check.RESOLVED", 0.03)
+    monkeypatch.setattr("annelid.experiment.convergence.RESOLVED", 0.03)
+    monkeypatch.setattr("annelid.experiment.sweep.sweep_figure", lambda *_: Path("sweep.png"))
     grid, _, _ = SHORT.replace("1.0, 1e4", "0.3, 1.0, 1.4, 1e4").rpartition("[[vary]]")
     Path("study.toml").write_text(grid)
     words = ("sweep", "study.toml", "-o", "out", "--jobs", "1", "--check", "2")
@@ -58,7 +59,8 @@ def test_a_check_says_which_runs_are_resolved_in_rows_words_and_json(
     results = json.loads(annelid(*words, "--json").out)["results"]
     first, second, third, fourth = [row["check"] for row in results["sweep.csv"]]
     assert (first, second, fourth) == ("resolved", None, None)
-    assert third.startswith("these numbers move by more than 3 %: elongation, first helix, pp (4.8 %)")
+    assert third.startswith("these numbers move by more than 3 %: ")
+    assert "elongation (4.8 %)" in third
     assert {number: one["resolved"] for number, one in results["check"].items()} == {"0": True, "2": False}
 
 

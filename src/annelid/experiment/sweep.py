@@ -28,7 +28,7 @@ from annelid.config.study import MOST_RUNS
 from annelid.draw.figures.sweep import sweep_figure, worded
 from annelid.errors import ConfigError, suggest
 from annelid.experiment.case import Case
-from annelid.experiment.check import Check, check_runs
+from annelid.experiment.convergence import Check, check_runs
 from annelid.experiment.executors import workers
 from annelid.experiment.progress import StudyProgress
 from annelid.experiment.search_space import (

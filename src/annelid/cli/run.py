@@ -123,7 +123,6 @@ def run_command(
     annelid run wang --uncertainty 8 --uncertainty-from mine/calibration.json
     """
     from annelid.config import load_config
-    from annelid.draw.gallery import draw_all
     from annelid.plausibility import refuse_nonsense
     from annelid.simulation.loop import simulate
     from annelid.simulation.runfile import FILE_NAME, open_run
@@ -198,6 +197,9 @@ def run_command(
         from annelid.experiment.uncertainty import uncertainty_table, write_uncertainty
 
         print_results(write_uncertainty(result), uncertainty_table(result), quiet=quiet)
+    # Only now: what draws is not to be loaded before the table.
+    from annelid.draw.gallery import draw_all
+
     drawn = draw_all(done, folder, video=video, quiet=quiet, complain=complain)
     if quiet or wants_json():
         print_paths(drawn)

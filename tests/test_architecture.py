@@ -243,7 +243,8 @@ def test_every_public_name_can_be_had_and_documents_its_arguments_and_errors() -
         for name in getattr(module, "__all__", ()):
             function = getattr(module, name)
             if not inspect.isfunction(function):
-                assert function is not None
+                # A module of the room with the same name would hide what is loaded on first use.
+                assert not inspect.ismodule(function), f"{room}.{name}"
                 continue
             text, own = inspect.getdoc(function) or "", list(inspect.signature(function).parameters)
             _, stands, arguments = text.partition("Args:")

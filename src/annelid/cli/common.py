@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from annelid.config import RunConfig
-    from annelid.experiment.check import Check
+    from annelid.experiment.convergence import Check
     from annelid.experiment.store import Store
     from annelid.live import Plot
     from annelid.simulation.runfile import Run

@@ -158,7 +158,7 @@ def run_command(
     try:
         if check or uncertainty is not None:
             from annelid.experiment import uncertainty as error_bars
-            from annelid.experiment.check import check as check_run
+            from annelid.experiment.convergence import check as check_run
             from annelid.experiment.progress import study_progress
 
             spread = error_bars.read_spread(uncertainty_from).but(_errors(vary))

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from annelid.config import load_config
 from annelid.errors import ConfigError
 from annelid.experiment import store
-from annelid.experiment.check import RESOLVED, Check, check, compare, refinements
+from annelid.experiment.convergence import RESOLVED, Check, check, compare, refinements
 from annelid.experiment.outcome import Outcome, outcome
 from annelid.experiment.store import Done
 from annelid.output import write_json

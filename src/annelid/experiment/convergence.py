@@ -104,13 +104,20 @@ class Check:
     def sentence(self) -> str:
         """Says in plain words what the check has found."""
         finer = " and ".join(self.finer)
+        left = (
+            ""
+            if len(self.finer) > 1
+            else " Only the step is finer: a planar worm has no elements, a chain keeps its own."
+        )
         if self.resolved:
-            return f"Resolved: with {finer} no number moves by more than {percent(RESOLVED)}."
+            return f"Resolved: with {finer} no number moves by more than {percent(RESOLVED)}.{left}"
         # A finer step costs less than a finer mesh, so that it comes first where both help.
         moved = [self.moved[name] for name in self.unresolved]
         helps = [one for one in self.finer if any(by.get(one, 0.0) > RESOLVED for by in moved)]
         field, value = next(iter(self.finer[(helps or [*self.finer])[0]].items()))
-        return f"Not resolved: with {finer} {'; '.join(self.faults)}. Try --set {field}={value:g}, and check again."
+        return (
+            f"Not resolved: with {finer} {'; '.join(self.faults)}. Try --set {field}={value:g}, and check again.{left}"
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Returns all of it for JSON, where a change is None if only one of the two runs has the number."""

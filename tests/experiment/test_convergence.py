@@ -49,6 +49,12 @@ def test_rods_are_refined_in_step_and_mesh_and_others_in_step_alone() -> None:
         assert only.startswith("half the step")
 
 
+def test_a_check_says_that_only_the_step_is_finer(planar: Outcome) -> None:
+    for factor in (1.0, 2.0):
+        found = compared(planar, Done(of(planar, travel_m=factor)))
+        assert "Only the step is finer: a planar worm has no elements, a chain keeps its own." in found.sentence
+
+
 @settings(max_examples=25)
 @given(factor=st.floats(0.5, 2.0))
 def test_a_number_moves_by_its_relative_change_and_a_share_by_its_own(planar: Outcome, factor: float) -> None:

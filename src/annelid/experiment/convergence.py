@@ -104,11 +104,8 @@ class Check:
     def sentence(self) -> str:
         """Says in plain words what the check has found."""
         finer = " and ".join(self.finer)
-        left = (
-            ""
-            if len(self.finer) > 1
-            else " Only the step is finer: a planar worm has no elements, a chain keeps its own."
-        )
+        only = " Only the step is finer: a planar worm has no elements, a chain keeps its own."
+        left = only if len(self.finer) == 1 else ""
         if self.resolved:
             return f"Resolved: with {finer} no number moves by more than {percent(RESOLVED)}.{left}"
         # A finer step costs less than a finer mesh, so that it comes first where both help.

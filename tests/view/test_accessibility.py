@@ -44,7 +44,7 @@ def too_wide(page: Page) -> list[str]:
 
 
 def test_the_site(page: Page, site: Path) -> None:
-    page.goto((site / "gait.html").as_uri())
+    page.goto((site / "evidence/gait.html").as_uri())
     page.wait_for_timeout(300)
     assert serious(page) == []
     assert too_wide(page) == []

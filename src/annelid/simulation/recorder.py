@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from annelid.config import RunConfig
+from annelid.errors import ConfigError
 from annelid.protocols import Array, Recordable, Sensation, Signal, Values
 from annelid.simulation import container, runfile
 from annelid.simulation.checkpoint import slot_capacity, to_slot
@@ -139,6 +140,7 @@ def layout(
     m, ``(n_segments, n_sensors)``; without a first checkpoint the simulation cannot be continued.
 
     Raises:
+        ConfigError: The controller is made for another number of segments.
         ValueError: Two signals share a name, or give one dimension different sizes.
     """
     signals = [signal for part in parts for signal in part.signals]
@@ -172,6 +174,11 @@ def layout(
     for part in parts:
         labels |= part.coords
     for dim in filter(sizes.__contains__, labels):
+        if len(labels[dim]) != sizes[dim]:
+            raise ConfigError(
+                f"the controller is made for {len(labels[dim])} of {dim!r}, and the body has {sizes[dim]}: make it for "
+                "this body, or give the body as many segments"
+            )
         kind = "str" if all(isinstance(label, str) for label in labels[dim]) else "<i8"
         variables.append(Variable(dim, (dim,), "1", f"label of each {dim}", kind, list(labels[dim])))
     rest = "length of a stretch sensor at rest"

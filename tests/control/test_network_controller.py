@@ -58,9 +58,9 @@ def test_it_is_the_network_stepped_by_hand() -> None:
 
 
 def test_outputs_and_control_step_must_fit(tmp_path: Path) -> None:
-    six = annelid.load_config("riddle2025-muscles", {"duration_s": 0.02})
-    with pytest.raises(ConfigError, match=f"made for {N} of 'segment', and the body has 6"):
-        annelid.simulate(six, tmp_path, controller=controller(), progress=False)
+    three = annelid.load_config("riddle2023-rods", {"duration_s": 0.02})
+    with pytest.raises(ConfigError, match=f"made for {N} of 'segment', and the body has 3"):
+        annelid.simulate(three, tmp_path, controller=controller(), progress=False)
     with pytest.raises(ConfigError, match="1 outputs expand and 2 contract"):
         NetworkController(baton(), {}, ["segment1", ("segment2", "segment3")])
     late = controller(control_timestep_s=0.002)

@@ -56,6 +56,13 @@ def test_recording_is_sparse_unless_the_case_says_otherwise() -> None:
     assert own.signals_interval_s == usual.signals_interval_s
 
 
+def test_a_worm_of_another_control_step_is_recorded_at_whole_numbers_of_it() -> None:
+    own = Case("riddle2022-planar", {"clock.control_timestep_s": 0.0007, "clock.physics_timestep_s": 0.0007})
+    record = own.config.record
+    assert record.signals_interval_s == pytest.approx(0.0098)
+    assert record.frames_interval_s == pytest.approx(51 * 0.0098)
+
+
 def test_further_changes_win() -> None:
     case = Case(RODS, {"seed": 1, "arena.friction": 0.3}).but({"seed": 2})
     assert (case.config.seed, case.preset) == (2, RODS)

@@ -18,7 +18,7 @@ SHEAR_OVER_YOUNG = 1.0 / 1.5
 """G/E of the paper's strands (0.2 and 0.3 GPa) and of the authors' later model's (1.33 and 2 GPa)."""
 
 # Samples and postures of a study's runs: enough for its numbers and for a picture at 1.5 s, a tenth of the disk.
-_SPARSE = {"record.signals_interval_s": 0.01, "record.frames_interval_s": 0.5}
+_SAMPLES_S, _FRAMES_S = 0.01, 0.5
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,11 @@ class Case:
         config = load_config(self.preset, dict(self.changes))
         if any(path.startswith("record.") for path in self.changes):
             return config
-        return load_config(config.model_dump(), _SPARSE)
+        # Whole numbers of control steps, which worms of one's own size have of other lengths.
+        samples_s = _multiple(_SAMPLES_S, config.clock.control_timestep_s)
+        frames_s = _multiple(_FRAMES_S, samples_s)
+        sparse = {"record.signals_interval_s": samples_s, "record.frames_interval_s": frames_s}
+        return load_config(config.model_dump(), sparse)
 
     @property
     def stem(self) -> str:
@@ -66,6 +70,11 @@ class Case:
     def but(self, changes: Mapping[str, Any]) -> Case:
         """Returns the case with further changes."""
         return replace(self, changes={**self.changes, **changes})
+
+
+def _multiple(interval_s: float, of_s: float) -> float:
+    """The multiple of a step that is nearest to an interval, at least one."""
+    return round(max(1, round(interval_s / of_s)) * of_s, 12)
 
 
 def write_worm(path: Path, source: str, fields: Mapping[str, Any], heading: Sequence[str]) -> None:

@@ -56,8 +56,10 @@ def test_recording_is_sparse_unless_the_case_says_otherwise() -> None:
     assert own.signals_interval_s == usual.signals_interval_s
 
 
-def test_a_worm_of_another_control_step_is_recorded_at_whole_numbers_of_it() -> None:
-    own = Case("riddle2022-planar", {"clock.control_timestep_s": 0.0007, "clock.physics_timestep_s": 0.0007})
+def test_a_worm_of_another_control_step_is_recorded_at_whole_numbers_of_it(tmp_path: Path) -> None:
+    text = 'extends = "riddle2022-planar"\n[clock]\ncontrol_timestep_s = 0.0007\nphysics_timestep_s = 0.0007\n'
+    (tmp_path / "own.toml").write_text(text + "[record]\nsignals_interval_s = 0.0007\nframes_interval_s = 0.07\n")
+    own = Case(str(tmp_path / "own.toml"))
     record = own.config.record
     assert record.signals_interval_s == pytest.approx(0.0098)
     assert record.frames_interval_s == pytest.approx(51 * 0.0098)

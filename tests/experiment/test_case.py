@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import shlex
 from itertools import pairwise
+from pathlib import Path
 
 import pytest
 from hypothesis import given, settings

@@ -4,5 +4,6 @@ from annelid.config import add_presets
 from annelid_studies import faults as faults
 from annelid_studies import oscillators as oscillators
 from annelid_studies import planar as planar
+from annelid_studies.challenge import controllers as controllers
 
 add_presets("annelid_studies")

@@ -108,6 +108,7 @@ RENAMED = {"controller.let_go_s": "controller.motor_time_constant_s"}
 _LOADS = ("'sns-pressure' has the loads of the six-segment robot", "'sns-pressure' has the lengths of the same robot")
 _SOLVER = "the solver's limits are constants of the formulation"
 _TOUCH = "'touch' is the published rule"
+_FAULTS = "the faults are lost sensors, a weak segment and a pull"
 _ROBUST = {
     "capacitance_nF": 5.0,
     "leak_conductance_uS": 1.0,
@@ -173,6 +174,13 @@ GONE: Mapping[str, tuple[str, Any]] = {
     "controller.contact_cue_N": ("'shc' always waits for the stretch of its segments", 0.2),
     "controller.coupling_per_s": ("'phase-chain' has the salamander's coupling", 10.0),
     "trial.loss_s": ("a loss lasts 0.2 s", 0.2),
+    **dict.fromkeys(
+        (f"trial.{name}" for name in ("drift_m_per_s", "resolution_m", "delay_s", "backlash", "push_N", "push_from_s")),
+        (_FAULTS, 0.0),
+    ),
+    "trial.push_s": (_FAULTS, 0.5),
+    "trial.silent_s": (_FAULTS, 0.0),
+    "trial.random_s": (_FAULTS, 0.0),
     "turning.arm_N": (_TOUCH, 2.0),
     "turning.hold_s": (_TOUCH, 6.0),
     "turning.least_N": (_TOUCH, 1.0),

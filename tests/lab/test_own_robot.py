@@ -277,5 +277,5 @@ def test_what_is_no_robot_is_refused_with_its_line_and_what_to_do(text: str, wor
 def test_the_section_has_its_own_ground() -> None:
     with pytest.raises(ConfigError, match=r"arena has no effect on body\.kind = 'mjcf'"):
         robot(changes={"arena.kind": "floor"})
-    with pytest.raises(ConfigError, match=r"trial.push_N = 1: body.kind = 'mjcf' cannot be pushed"):
-        robot(changes={"trial.push_N": 1.0})
+    with pytest.raises(ConfigError, match=r"trial.pull = 0.1: body.kind = 'mjcf' cannot be pulled"):
+        robot(changes={"trial.pull": 0.1})

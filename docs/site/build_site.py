@@ -17,6 +17,7 @@ from pathlib import Path
 
 import yaml
 
+import annelid
 import command_reference
 import configuration_reference
 import examples_page
@@ -35,6 +36,7 @@ GENERATED = {
     "reference/numbers.md": numbers_reference.page,
     "reference/run_file.md": run_file_reference.page,
 }
+"""What is added to pages that have only their introduction in the repository."""
 
 
 def build(folder: Path) -> Path:
@@ -54,6 +56,7 @@ def build(folder: Path) -> Path:
     gather(pages)
     settings = yaml.safe_load(SETTINGS.read_text(encoding="utf-8"))
     settings |= {"docs_dir": pages.name, "site_dir": site.name}
+    settings["site_name"] += f" {annelid.__version__}"
     settings["nav"] = expanded(settings["nav"], [path.relative_to(pages).as_posix() for path in pages.rglob("*.md")])
     (folder / "mkdocs.yml").write_text(yaml.safe_dump(settings, sort_keys=False), encoding="utf-8")
     shutil.rmtree(site, ignore_errors=True)
@@ -69,7 +72,8 @@ def gather(target: Path) -> None:
     shutil.rmtree(target, ignore_errors=True)
     shutil.copytree(PAGES, target, ignore=shutil.ignore_patterns(Path(__file__).parent.name))
     for name, page in GENERATED.items():
-        (target / name).write_text(page(), encoding="utf-8")
+        with (target / name).open("a", encoding="utf-8") as introduced:
+            introduced.write(f"\n{page()}")
     for tutorial in sorted((PAGES / "tutorials").glob("*.md")):
         shown = notebooks.run(tutorial.read_text(encoding="utf-8"), tutorial.stem)
         (target / "tutorials" / tutorial.name).write_text(shown.markdown, encoding="utf-8")

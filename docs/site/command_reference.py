@@ -10,12 +10,12 @@ WIDTH = 92
 
 
 def page() -> str:
-    """Returns the page: the help of every command, as it prints it."""
+    """Returns the page below its introduction: the help of every command, as it prints it."""
     from typer.main import get_command
 
     from annelid.cli import app
 
-    lines = ["# Commands", "", "This page lists all commands, as `annelid COMMAND --help` describes them."]
+    lines: list[str] = []
     for words, text in _helps(get_command(app), ("annelid",)):
         depth = 2 if len(words) < 3 else 3
         lines += ["", f"{'#' * depth} {' '.join(words)}", "", "```text", text.rstrip(), "```"]

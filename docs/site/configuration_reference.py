@@ -15,23 +15,13 @@ from pydantic_core import PydanticUndefined
 from annelid.config import LEVELS, RunConfig, Section, toml_value, unit_of
 from annelid.config.checking import sections_in
 
-INTRODUCTION = """# Configuration
-
-This page lists every field of a configuration. Set a field by its path, which is the section and the name of the field:
-`--set body.mesh.radius_m=0.14`, or `annelid.load_config(preset, {"body.mesh.radius_m": 0.14})`, or in a TOML file. You
-may leave out the unit at the end of a name (`arena.radius` for `arena.radius_m`). Lists are written `[0.5, 1.1]`.
-
-The defaults below are those of a configuration without a preset. A preset has its own values:
-`annelid list presets riddle2023-rods --fields` prints them. Where a section has several kinds, its `kind` decides which
-fields it has. If you change the kind, the section starts from the defaults of the new kind.
-"""
 LARGEST = 1e15
 """Bound of numbers that have none by their nature; not worth telling."""
 
 
 def page() -> str:
-    """Returns the page: a table a section, with every field's unit, default, bounds and meaning."""
-    lines = [INTRODUCTION]
+    """Returns the page below its introduction: a table a section, with unit, default, bounds and meaning of fields."""
+    lines: list[str] = []
     for path, section in sections_of(RunConfig, ""):
         kind = section.model_fields.get("kind")
         heading = path or "The run itself"

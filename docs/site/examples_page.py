@@ -7,7 +7,7 @@ from pathlib import Path
 
 
 def page(folder: Path) -> str:
-    """Returns the page: what every example is for, then each with its code.
+    """Returns the page below its introduction: what every example is for, then each with its code.
 
     Args:
         folder: Where the examples are.
@@ -15,11 +15,6 @@ def page(folder: Path) -> str:
     examples = {path.stem: path.read_text(encoding="utf-8") for path in sorted(folder.glob("*.py"))}
     purposes = {name: (ast.get_docstring(ast.parse(code)) or "").splitlines()[0] for name, code in examples.items()}
     lines = [
-        "# Examples",
-        "",
-        "This page shows short programs that you can copy and change. They are in the folder `examples` of the",
-        "repository, each under 60 lines, and the tests run them.",
-        "",
         "| example | what it is for |",
         "|---|---|",
         *(f"| [{name}](#{name}) | {purpose} |" for name, purpose in purposes.items()),

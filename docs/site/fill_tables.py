@@ -1,30 +1,31 @@
 """Fills the tables of the pages with numbers from result files.
 
-    python docs/site/fill_tables.py              after a result file or a marker has changed
+    python docs/site/fill_tables.py              after a result file or a table's formulas have changed
     python docs/site/fill_tables.py --check      names the pages that differ from their files; ends with 1 if any does
     python docs/site/fill_tables.py --measured slip.csv riddle2025-muscles crawler
                                                  notes which worms a result file was just measured on, in worms.toml
 
-A table stands between two comments. The first names the result files, the command that makes them, and the table, with
-Python's ``{expression:format}`` for numbers; published numbers are written out:
+In a page a table stands between two comments:
 
-    <!-- table: results/speed.csv
-    made by: annelid study speed -o speed
-    | gait | friction | speed (cm/s) |
-    |---|---|---|
-    for each if quantity == "friction":
-    | `{gait}` | {value} | {100 * speed_m_per_s:.1f} |
-    -->
+    <!-- table: pipes/bends -->
 
     <!-- end of table -->
 
-A record goes by the text of its first column: ``{crawler.speed_m_per_s:.3f}``. The line below ``for each`` is repeated
-for every record, with its columns as names. Characters that no name may have are underscores:
-``arena.friction`` is ``arena_friction``. ``results/bench.json:cases`` takes records from within a JSON file; a whole
-one is a record that goes by the file's name. Columns ``speed_1``, ``speed_2`` .. are together ``speed``, an array whose
-numbers are written side by side. True and false read yes and no, what is missing a dash. Within ``for each``,
-``other("text")`` is the record that goes by that text, with dashes only if there is none. A table whose file does not
-exist yet stays as it is.
+It is the section ``bends`` of ``docs/results/tables/pipes.toml``, with Python's ``{expression:format}`` for numbers:
+
+    [bends]
+    results = ["pipes.csv"]
+    head = "| radius (m) | gait | speed (cm/s) |"
+    condition = 'arena == "bend"'
+    each = "| {radius_m:g} | {gait} | {100 * speed_m_per_s:.1f} |"
+
+Every line of ``each`` is repeated for all records that meet the condition, with their columns as names. A line of
+``rows`` stands once; there a record goes by the text of its first column: ``{crawler.speed_m_per_s:.3f}``. Characters
+that no name may have are underscores: ``arena.friction`` is ``arena_friction``. ``bench.json:cases`` takes records from
+within a JSON file; a whole one is a record that goes by the file's name. Columns ``speed_1``, ``speed_2`` .. are
+together ``speed``, an array whose numbers are written side by side. True and false read yes and no, what is missing a
+dash. In ``each``, ``other("text")`` is the record that goes by that text, with dashes only if there is none. A table
+whose file does not exist yet stays as it is. ``docs/results/made_by.toml`` has the command that makes each file.
 """
 
 from __future__ import annotations
@@ -35,7 +36,9 @@ import json
 import math
 import re
 import sys
+import tomllib
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -48,15 +51,10 @@ from annelid.config import load_config
 ROOT = Path(__file__).parent.parent.parent
 DOCS = ROOT / "docs"
 START, END = "<!-- table:", "<!-- end of table -->"
-MARKED = re.compile(
-    rf"^(?P<marker>{START} (?P<files>.+)\nmade by: (?P<command>.+)\n(?P<template>(?:.+\n)+)-->\n)"
-    rf"(?:[^<]|<(?!!--))*{END}",
-    re.MULTILINE,
-)
-FILE = re.compile(r"results/\w+\.(?:csv|json:\w+|json)")
+MARKED = re.compile(rf"^{START} (?P<file>\w+)/(?P<name>\w+) -->\n(?:[^<]|<(?!!--))*{END}", re.MULTILINE)
+FILE = re.compile(r"\w+\.(?:csv|json:\w+|json)")
 WORMS = "results/worms.toml"
 """Result files, each with the presets that its numbers are of, and what these were then."""
-EACH = re.compile(r"for each(?: if (?P<condition>.+))?:")
 
 
 class PerSegment(np.ndarray):
@@ -67,51 +65,83 @@ class PerSegment(np.ndarray):
 
 
 class FillError(Exception):
-    """A marker or a result file is not as described above."""
+    """A marker, a table or a result file is not as described above."""
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A section of a file of tables.
+
+    Attributes:
+        results: The result files, those of ``docs/results``.
+        head: The first line.
+        rows: Lines that stand once.
+        each: Lines for every record.
+        condition: Which records these are for.
+    """
+
+    results: Sequence[str]
+    head: str
+    rows: str = ""
+    each: str = ""
+    condition: str = "True"
 
 
 def filled(page: str, docs: Path = DOCS) -> str:
     """Returns a page with the numbers of its result files, which lie in a folder of ``docs``.
 
     Raises:
-        FillError: A marker is not of the form above, or names what its files do not have.
+        FillError: A marker or its table is not of the form above, or names what its files do not have.
     """
-    blocks = list(MARKED.finditer(page))
-    if page.count(START) != len(blocks) or page.count(END) != len(blocks):
+    if not page.count(START) == page.count(END) == len(MARKED.findall(page)):
         raise FillError("a table's marker or its end is not of the form that docs/site/fill_tables.py describes")
 
     def block(found: re.Match[str]) -> str:
-        files = found["files"].split(", ")
-        if missing_files(files, docs):
+        table = table_of(found, docs)
+        if missing_files(table, docs):
             return found[0]
-        records = [record for file in files for record in records_of(file, docs)]
-        return f"{found['marker']}\n{table(found['template'].splitlines(), records)}\n\n{END}"
+        records = [record for file in table.results for record in records_of(file, docs)]
+        marker, _, _ = found[0].partition("\n")
+        return f"{marker}\n\n{lines_of(table, records)}\n\n{END}"
 
     return MARKED.sub(block, page)
 
 
-def waiting(page: str, docs: Path = DOCS) -> dict[str, str]:
-    """Returns the result files of a page that do not exist yet, and the command that makes each."""
-    blocks = MARKED.finditer(page)
-    return {file: found["command"] for found in blocks for file in missing_files(found["files"].split(", "), docs)}
+def tables_of(page: str, docs: Path = DOCS) -> list[Table]:
+    """Returns the tables of a page."""
+    return [table_of(found, docs) for found in MARKED.finditer(page)]
 
 
-def missing_files(files: Sequence[str], docs: Path) -> list[str]:
-    """Returns those of the files named in a marker that do not exist.
+def table_of(marker: re.Match[str], docs: Path) -> Table:
+    """Reads the table that a marker names.
 
     Raises:
-        FillError: A name is none of a result file.
+        FillError: There is no such table, or it is not of the form above.
     """
-    for file in files:
-        if not FILE.fullmatch(file):
-            raise FillError(f"{file!r} is none of results/NAME.csv, results/NAME.json and results/NAME.json:KEY")
-    return [file for file in files if not (docs / file.partition(":")[0]).exists()]
+    path = docs / "results" / "tables" / f"{marker['file']}.toml"
+    try:
+        table = Table(**tomllib.loads(path.read_text(encoding="utf-8"))[marker["name"]])
+    except (OSError, KeyError, TypeError) as error:
+        raise FillError(f"{path.name}, [{marker['name']}]: {error!r}") from error
+    if wrong := [file for file in table.results if not FILE.fullmatch(file)]:
+        raise FillError(f"{path.name}: {wrong[0]!r} is none of NAME.csv, NAME.json and NAME.json:KEY")
+    return table
+
+
+def missing_files(table: Table, docs: Path) -> list[str]:
+    """Returns those of a table's result files that do not exist."""
+    return [file for file in table.results if not (docs / "results" / file.partition(":")[0]).exists()]
+
+
+def made_by(docs: Path = DOCS) -> dict[str, str]:
+    """Returns the command that makes each result file."""
+    return tomllib.loads((docs / "results" / "made_by.toml").read_text(encoding="utf-8"))
 
 
 def records_of(file: str, docs: Path) -> Iterator[dict[str, Any]]:
     """Reads the records of a result file: numbers and texts by the names that a template may use."""
     name, _, key = file.partition(":")
-    text = (docs / name).read_text(encoding="utf-8")
+    text = (docs / "results" / name).read_text(encoding="utf-8")
     rows: Any = list(csv.DictReader(text.splitlines())) if name.endswith(".csv") else json.loads(text)
     if isinstance(rows, dict):
         rows = rows[key] if key else {Path(name).stem: rows}
@@ -148,8 +178,8 @@ def read(value: Any) -> Any:
     return {"None": math.nan, "": math.nan, "True": "yes", "False": "no"}.get(str(value), value)
 
 
-def table(template: Sequence[str], records: Sequence[Mapping[str, Any]]) -> str:
-    """Returns the lines of a template with numbers filled in.
+def lines_of(table: Table, records: Sequence[Mapping[str, Any]]) -> str:
+    """Returns the lines of a table with numbers filled in.
 
     Raises:
         FillError: An expression has no value.
@@ -159,19 +189,18 @@ def table(template: Sequence[str], records: Sequence[Mapping[str, Any]]) -> str:
     def other(label: str) -> SimpleNamespace:
         return by_label.get(identifier(label), SimpleNamespace(**dict.fromkeys(records[0], math.nan)))
 
-    lines, names = [], [by_label]
-    for line in template:
-        if each := EACH.fullmatch(line):
-            chosen = [record for record in records if evaluated(each["condition"] or "True", record)]
-            names = [{**by_label, **record, "other": other} for record in chosen]
-        else:
-            lines += [re.sub(r"[+-]?\bnan\b", "–", evaluated(f"rf'''{line}'''", each_of)) for each_of in names]
-            names = [by_label]
+    def line(template: str, names: Mapping[str, Any]) -> str:
+        return re.sub(r"[+-]?\bnan\b", "–", evaluated(f"rf'''{template}'''", names))
+
+    chosen = [{**by_label, **record, "other": other} for record in records if evaluated(table.condition, record)]
+    lines = [table.head, "|" + "---|" * (table.head.count("|") - 1)]
+    lines += [line(row, by_label) for row in table.rows.splitlines()]
+    lines += [line(row, names) for row in table.each.splitlines() for names in chosen]
     return "\n".join(lines)
 
 
 def evaluated(expression: str, names: Mapping[str, Any]) -> Any:
-    """Evaluates an expression of a page, which is this repository's own code as its commands and tutorials are."""
+    """Evaluates an expression of a table, which is this repository's own code as its commands and tutorials are."""
     try:
         return eval(expression, dict(names))
     except Exception as error:
@@ -187,8 +216,8 @@ def main(check: bool, root: Path = ROOT) -> int:
             new = filled(page, docs)
         except FillError as error:
             raise SystemExit(f"{name}: {error}") from error
-        for file, command in waiting(page, docs).items():
-            print(f"{name}: waits for docs/{file}, made by: {command}")
+        for file in {file for table in tables_of(page, docs) for file in missing_files(table, docs)}:
+            print(f"{name}: waits for docs/results/{file}")
         if new != page:
             differing = True
             print(f"{name}: {'differs from its result files' if check else 'filled'}")

@@ -25,20 +25,10 @@ WITH_ALL_SIGNALS = {
     "sns-robust": {"motor_time_constant_s": 0.35, "descending": {"lift": 0.45}},
 }
 """What kinds of controllers must be told before they record all that they can."""
-INTRODUCTION = """# The run file
-
-This page lists all variables of a run file, `run.nc`, which is netCDF-4. [How to read a run](../how_to/read_a_run.md)
-shows how to open it, with `annelid.open_run` or with any program that reads netCDF.
-[Data out](../data_out.md#the-run-file) says at which instant each value is taken.
-
-Every variable has the attributes `units` and `long_name`. Signals are recorded at the times `time` (s), every
-`record.signals_interval_s`; postures at `frame_time` (s), every `record.frames_interval_s`. `stretch_rest_length`
-(segment, sensor; m) has the lengths of the stretch sensors at rest.
-"""
 
 
 def page() -> str:
-    """Returns the page: every variable with its dimensions, unit, meaning, and who records it."""
+    """Returns the page below its introduction: every variable with dimensions, unit, meaning, and who records it."""
     bodies: dict[str, list[str]] = {}
     controllers: dict[str, list[str]] = {}
     signals: dict[str, Signal] = {}
@@ -49,7 +39,7 @@ def page() -> str:
         signals.setdefault(signal.name, signal)
         controllers.setdefault(signal.name, []).append(who)
     loop = {signal.name: signal for signal in loop_signals(3).signals}
-    lines = [INTRODUCTION, "## In every run", *_table(loop, {})]
+    lines = ["## In every run", *_table(loop, {})]
     lines += ["", "## Recorded by the body", *_table({name: signals[name] for name in bodies}, bodies, len(BODIES))]
     lines += ["", "## Recorded by the controller", *_table({name: signals[name] for name in controllers}, controllers)]
     return "\n".join(lines) + "\n"

@@ -194,7 +194,7 @@ def test_every_option_with_a_unit_says_it() -> None:
 
     numbers = [each for each in options(get_command(app)) if "float" in str(each.type_descriptor.annotation)]
     assert numbers
-    unit = re.compile(r"(?<!')\b(s|ms|mV|mm|m|N|rad|share|a second|seconds)\b", re.IGNORECASE)
+    unit = re.compile(r"(?<!')\b(s|ms|mV|mm|m|N|rad|share|per second|seconds)\b", re.IGNORECASE)
     for option in numbers:
         assert unit.search(option.help), option.opts
 

@@ -12,11 +12,11 @@ from itertools import groupby
 from pathlib import Path
 
 import pytest
-from doc_commands import PAGES, ROOT, Command
+from doc_commands import PAGES, ROOT, Command, commands_of
 from test_doc_commands import check_annelid, check_program
 
 import measure_runs
-from fill_tables import DOCS, MARKED, WORMS, FillError, filled, main, measured, waiting, worm
+from fill_tables import DOCS, MARKED, WORMS, FillError, filled, made_by, main, measured, missing_files, tables_of, worm
 
 MOST = 5
 """Cells with a number that a table may have and not be one of results."""
@@ -37,7 +37,7 @@ EXCEPTIONS = {
     ("docs/evidence/paper.md", "quantity"): "the whole page is written by `annelid paper -o report --claims FILE.md`",
     ("docs/evidence/paper.md", "#"): "the same",
     ("docs/troubleshooting.md", "code"): "exit codes, not results",
-    ("docs/presets.md", "field"): "fields of a preset, which tests/test_presets.py compares with its sources",
+    ("docs/evidence/presets.md", "field"): "fields of a preset, which tests/test_presets.py compares with its sources",
     ("docs/evidence/validation.md", "formulation"): "printed by `pytest -m slow -s tests/body/test_ring_down.py`",
     ("docs/evidence/validation.md", "step (ms)"): "the same",
     ("docs/wire.md", "bytes"): "the protocol, not results",
@@ -85,25 +85,28 @@ STALE: tuple[str, ...] = (
 """Result files whose worms have changed since: to be measured again."""
 
 LISTS = sorted(path for path in (DOCS / "results").glob("*.toml") if "[runs]" in path.read_text(encoding="utf-8"))
+ARTICLE_AND_PAGES = PAGES | {"paper/paper.md": (ROOT / "paper" / "paper.md").read_text(encoding="utf-8")}
+TABLES = [table for page in ARTICLE_AND_PAGES.values() for table in tables_of(page)]
 PAGE = """# Gaits
 
-<!-- table: results/gaits.csv, results/bench.json:levels
-made by: annelid study speed -o speed
-| gait | of friction | speed | elongation |
-|---|---|---|---|
-for each if run != "fast":
-| {run} | {arena_friction} | {100 * speed_m:.1f} cm/s | {100 * (e_m / slow_one.e_m):.0f} % |
-| `fast`, ordered: {fast.ordered} | | {fast.speed_m / slow_one.speed_m:.1f} times | published: 4 / 5 cm |
--->
+<!-- table: page/gaits -->
 
 <!-- end of table -->
+"""
+TABLE = """
+[gaits]
+results = ["gaits.csv", "bench.json:levels"]
+head = "| gait | of friction | speed | elongation |"
+rows = "| `fast`, ordered: {fast.ordered} | | {fast.speed_m / slow_one.speed_m:.1f} times | published: 4 / 5 cm |"
+condition = 'run != "fast"'
+each = "| {run} | {arena_friction} | {100 * speed_m:.1f} cm/s | {100 * (e_m / slow_one.e_m):.0f} % |"
 """
 FILLED = """
 | gait | of friction | speed | elongation |
 |---|---|---|---|
+| `fast`, ordered: yes | | 2.5 times | published: 4 / 5 cm |
 | slow one | 0.3 | 2.0 cm/s | 100 / 100 % |
 | none | – | – cm/s | – / – % |
-| `fast`, ordered: yes | | 2.5 times | published: 4 / 5 cm |
 """
 
 
@@ -111,7 +114,8 @@ FILLED = """
 def docs(tmp_path: Path) -> Path:
     """A folder of pages with results."""
     tmp_path = tmp_path / "docs"
-    (tmp_path / "results").mkdir(parents=True)
+    (tmp_path / "results" / "tables").mkdir(parents=True)
+    (tmp_path / "results" / "tables" / "page.toml").write_text(TABLE)
     rows = "run,arena.friction,speed_m,e_m_1,e_m_2\nslow one,0.3,0.02,0.04,0.05\nnone,,,nan,\n"
     (tmp_path / "results" / "gaits.csv").write_text(rows)
     levels = {"levels": [{"run": "fast", "speed_m": 0.05, "ordered": True}], "machine": "none"}
@@ -132,8 +136,11 @@ def test_pages_have_the_numbers_of_their_files() -> None:
     assert [name for name, page in PAGES.items() if filled(page) != page] == [], "run: python docs/site/fill_tables.py"
 
 
-def test_only_these_files_are_waited_for() -> None:
-    assert {file for page in PAGES.values() for file in waiting(page)} == set(WAITING)
+def test_every_table_is_shown_and_only_these_files_are_waited_for() -> None:
+    named = {"/".join(found) for page in ARTICLE_AND_PAGES.values() for found in MARKED.findall(page)}
+    files = (DOCS / "results" / "tables").glob("*.toml")
+    assert named == {f"{path.stem}/{name}" for path in files for name in tomllib.loads(path.read_text("utf-8"))}
+    assert {file for table in TABLES for file in missing_files(table, DOCS)} == set(WAITING)
 
 
 def test_every_table_of_numbers_has_its_file() -> None:
@@ -141,23 +148,19 @@ def test_every_table_of_numbers_has_its_file() -> None:
 
 
 def test_every_result_file_is_shown() -> None:
-    named = {
-        file.partition(":")[0]
-        for page in PAGES.values()
-        for found in MARKED.finditer(page)
-        for file in found["files"].split(", ")
-    }
-    there = {path.relative_to(DOCS).as_posix() for path in (DOCS / "results").iterdir() if path.suffix != ".toml"}
+    named = {file.partition(":")[0] for table in TABLES for file in table.results}
+    assert set(made_by()) == named
+    there = {path.name for path in (DOCS / "results").glob("*.*") if path.suffix != ".toml"}
     assert {
         file
         for file in there - named
-        if not any(re.search(rf"\]\((?:\.\./)?{file}\)", page) for page in PAGES.values())
+        if not any(re.search(rf"\]\((?:\.\./)?results/{file}\)", page) for page in PAGES.values())
     } == set()
 
 
 def test_numbers_are_of_worms_as_they_are() -> None:
     known = tomllib.loads((DOCS / WORMS).read_text(encoding="utf-8"))
-    there = {path.name for path in (DOCS / "results").iterdir() if path.suffix != ".toml"}
+    there = {path.name for path in (DOCS / "results").glob("*.*") if path.suffix != ".toml"}
     assert set(known) == there - set(NO_WORM), "run: python docs/site/fill_tables.py --measured FILE PRESET.."
     changed = {file for file, worms in known.items() if any(worm(preset) != digest for preset, digest in worms.items())}
     assert changed == set(STALE)
@@ -175,13 +178,23 @@ def test_a_result_file_is_noted_with_its_worms(docs: Path) -> None:
         measured("missing.csv", ["crawler"], docs)
 
 
+def test_evidence_says_the_commands_of_its_tables() -> None:
+    missing = []
+    for name in PAGES:
+        said = commands_of(name) if name.startswith("docs/evidence/") else None
+        files = {file.partition(":")[0] for table in tables_of(PAGES[name]) for file in table.results}
+        lines = {one for file in files for one in made_by()[file].split("; ")}
+        missing += [
+            (name, line) for line in lines if said is not None and Command(tuple(shlex.split(line))) not in said
+        ]
+    assert missing == []
+
+
 def test_commands_that_make_results_are_understood() -> None:
-    made_by = {
-        one for page in PAGES.values() for found in MARKED.finditer(page) for one in found["command"].split("; ")
-    }
+    commands = {one for command in made_by().values() for one in command.split("; ")}
     lists = {one for path in LISTS for one in tomllib.loads(path.read_text(encoding="utf-8"))["runs"].values()}
     assert lists
-    for line in made_by | lists:
+    for line in commands | lists:
         words = tuple(shlex.split(line))
         (check_annelid if words[0] == "annelid" else check_program)(Command(words))
         assert all((ROOT / word).exists() for word in words if word.endswith(".toml")), line
@@ -195,12 +208,11 @@ def test_numbers_are_filled_in(docs: Path) -> None:
 
 def test_a_row_may_use_another_one_s_numbers(docs: Path) -> None:
     row = '| {run} | {other(run + " one").speed_m:.2f} | {other("nobody").speed_m:+.1f} |'
-    page = (
-        PAGE[: PAGE.index("for each")] + f"for each if run in ('fast', 'none'):\n{row}\n-->\n\n<!-- end of table -->\n"
-    )
+    table = TABLE[: TABLE.index("rows")] + f"condition = 'run in (\"fast\", \"none\")'\neach = '''{row}'''\n"
+    (docs / "results" / "tables" / "page.toml").write_text(table)
     rows = docs / "results" / "gaits.csv"
     rows.write_text(rows.read_text() + "none one,,0.04,nan,\n")
-    assert filled(page, docs).endswith("| none | 0.04 | – |\n| fast | – | – |\n\n<!-- end of table -->\n")
+    assert filled(PAGE, docs).endswith("| none | 0.04 | – |\n| fast | – | – |\n\n<!-- end of table -->\n")
 
 
 def test_a_changed_file_is_found(docs: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -219,20 +231,23 @@ def test_a_table_waits_for_its_file(docs: Path) -> None:
     page = filled(PAGE, docs)
     (docs / "results" / "gaits.csv").unlink()
     assert filled(page, docs) == page
-    assert waiting(page, docs) == {"results/gaits.csv": "annelid study speed -o speed"}
+    assert missing_files(tables_of(page, docs)[0], docs) == ["gaits.csv"]
 
 
-def test_a_wrong_marker_is_refused(docs: Path) -> None:
+def test_a_wrong_table_is_refused(docs: Path) -> None:
     for right, wrong in (
         ("{run}", "{name}"),
         ("slow_one.", "slower_one."),
-        ("results/gaits.csv", "results/../gaits.csv"),
-        ("results/gaits.csv", "/etc/gaits.csv"),
-        ("made by", "by"),
-        ("<!-- end of table -->", "<!-- end -->"),
+        ('["gaits.csv"', '["../gaits.csv"'),
+        ('["gaits.csv"', '["/etc/gaits.csv"'),
+        ("head =", "heads ="),
+        ("[gaits]", "[speeds]"),
     ):
+        (docs / "results" / "tables" / "page.toml").write_text(TABLE.replace(right, wrong))
         with pytest.raises(FillError):
-            filled(PAGE.replace(right, wrong), docs)
+            filled(PAGE, docs)
+    with pytest.raises(FillError, match="end"):
+        filled(PAGE.replace("<!-- end of table -->", "<!-- end -->"), docs)
 
 
 @pytest.mark.slow

@@ -12,7 +12,7 @@ from doc_commands import PAGES, ROOT, Command, steps_in
 from test_doc_commands import check_annelid, check_program
 
 from annelid.errors import ConfigError
-from fill_tables import MARKED
+from fill_tables import made_by
 from gallery import cases, main, make, makers, pictures
 
 GALLERY = "docs/gallery.md"
@@ -52,15 +52,11 @@ def test_a_picture_can_be_made_as_the_list_says(subtests: pytest.Subtests) -> No
 
 
 def test_the_command_of_numbers_is_that_of_their_table() -> None:
-    made_by = {
-        file: [words_of(command) for command in found["command"].split("; ")]
-        for page in PAGES.values()
-        for found in MARKED.finditer(page)
-        for file in found["files"].split(", ")
-    }
+    commands = made_by()
     for name, one in pictures().items():
-        for command in made_by.get(f"results/{one.results}", []):
-            assert command.words[: len(words_of(one.command).words)] == words_of(one.command).words, name
+        if one.results in commands:
+            for command in map(words_of, commands[one.results].split("; ")):
+                assert command.words[: len(words_of(one.command).words)] == words_of(one.command).words, name
 
 
 def test_the_sweep_is_that_of_its_page() -> None:

@@ -17,6 +17,8 @@ from packaging.utils import canonicalize_name
 from packaging.version import Version
 
 import annelid
+from annelid.cli.entry import OLD_COMMANDS
+from annelid.config.checking import RENAMED
 from fill_tables import filled
 
 PROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
@@ -92,6 +94,13 @@ def test_the_article_says_what_the_pages_say() -> None:
     library = parse_string(read("paper/paper.bib"))
     assert library.failed_blocks == []
     assert {entry.key for entry in library.entries} == set(re.findall(r"@(\w+)", text))
+
+
+def test_the_roadmap_has_the_names_that_go() -> None:
+    section = PAGES["docs/roadmap.md"].split("## Names that go")[1].split("\n## ")[0]
+    listed = dict(re.findall(r"^\|[A-Za-z ]*\| `([^`]+)` \| `([^`]+)` \|$", section, re.MULTILINE))
+    assert listed.pop("annelid.planar") == "annelid_studies.planar"
+    assert listed == {name: " ".join(now) for name, now in OLD_COMMANDS.items()} | RENAMED
 
 
 def test_forms_ask_for_something() -> None:

@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
+import pytest
 from doc_commands import PAGES as MARKDOWN
 from doc_commands import ROOT
 from markdown_it import MarkdownIt
@@ -42,12 +43,13 @@ WORDS = {
 }
 """What stood for a standard term once, as patterns, and the term."""
 
-LONGEST = 45
-"""Words of a sentence."""
+LONGEST, LONGEST_FOR_USERS = 45, 30
+"""Words of a sentence, on any page and on those that users read first."""
+
+FOR_USERS = ("docs/index.md", "docs/start.md")
 
 LONG_SENTENCES = (
     "docs/evidence/paper.md",
-    "docs/security.md",
     "docs/evidence/slip.md",
     "docs/evidence/validation.md",
 )
@@ -82,10 +84,14 @@ def text_of(token: Token) -> str:
     return " " if token.type in ("softbreak", "hardbreak") else token.content
 
 
-def long_sentences(page: str) -> list[str]:
+def long_sentences(page: str, longest: int = LONGEST) -> list[str]:
     """Returns the sentences of a page, outside of its tables and code, that have too many words."""
-    sentences = (each for kind, text in prose(page) if kind != "table" for each in ENDS.split(text))
-    return [each for each in sentences if len(each.split()) > LONGEST]
+    return [each for kind, text in prose(page) if kind != "table" for each in too_long(text, longest)]
+
+
+def too_long(text: str, longest: int = LONGEST_FOR_USERS) -> list[str]:
+    """Returns the sentences of a text that have too many words."""
+    return [each for each in ENDS.split(text) if len(each.split()) > longest]
 
 
 def found_in(text: str) -> list[str]:
@@ -100,11 +106,20 @@ def found_in(text: str) -> list[str]:
 
 def helps(command: Any, name: str) -> Iterator[tuple[str, str]]:
     """Walks the help texts of a command, its options and the commands below it, each with the name of its command."""
-    yield name, command.help or ""
+    # What stands below \b are examples, and not sentences.
+    yield from ((name, " ".join(text.split())) for text in (command.help or "").split("\n\n") if text[0] != "\b")
     for parameter in command.params:
         yield name, getattr(parameter, "help", None) or ""
     for below, each in getattr(command, "commands", {}).items():
         yield from helps(each, f"{name} {below}")
+
+
+def printed_helps(command: Any, name: str, parent: Any = None) -> Iterator[tuple[str, str]]:
+    """Walks the lines that a command and those below it print with --help, each with the name of its command."""
+    with command.make_context(name, [], parent=parent, resilient_parsing=True) as context:
+        yield from ((name, line) for line in command.get_help(context).splitlines())
+        for below, each in getattr(command, "commands", {}).items():
+            yield from printed_helps(each, below, context)
 
 
 def beginning(page: str) -> list[str]:
@@ -123,6 +138,17 @@ def test_command_help_has_standard_terms() -> None:
 
 def test_only_listed_pages_have_long_sentences() -> None:
     assert {page for page in PAGES if long_sentences(page)} == set(LONG_SENTENCES)
+
+
+def test_what_users_read_first_has_short_sentences() -> None:
+    found = [(name, each) for name, text in helps(get_command(app), "annelid") for each in too_long(text)]
+    pages = [page for page in PAGES if page.startswith(FOR_USERS)]
+    assert found + [(page, each) for page in pages for each in long_sentences(page, LONGEST_FOR_USERS)] == []
+
+
+def test_every_help_fits_80_columns(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    assert [(name, line) for name, line in printed_helps(get_command(app), "annelid") if len(line) > 80] == []
 
 
 def test_pages_begin_with_what_they_are_for() -> None:

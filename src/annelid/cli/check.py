@@ -19,12 +19,12 @@ def check(
     fidelity: FidelityLevel = None,
     arena: ArenaName = None,
 ) -> None:
-    """Check, before a run, whether the numbers of a 3D worm fit.
+    """Check before a run whether the numbers of a 3D worm fit together.
 
-    Lengths against the ring at rest, forces against what the mesh bears, the step against stiffness, the sensors'
-    tolerance against the mesh. A finding says what is wrong and what to set instead. With an error a run can mean
-    nothing, and is refused; with a warning it is doubtful, goes on, and its file says so. The exit code is 2 where
-    there is an error, else 0.
+    It compares lengths with the ring at rest, forces with the strength of the mesh, the step with the stiffness, and
+    the tolerance of the sensors with the mesh. A finding says what is wrong and what to set instead. A run with an
+    error is refused. A run with a warning is doubtful; its file says so. The exit code is 2 if there is an error, else
+    0.
 
     \b
     annelid check riddle2025 --set body.mesh.radius_m=0.05

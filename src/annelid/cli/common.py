@@ -78,8 +78,8 @@ FidelityLevel = Annotated[
     typer.Option(
         "--fidelity",
         metavar="LEVEL",
-        help="How finely a 3D worm of rods with rigid crossings is resolved: accurate, fast or preview"
-        " (docs/evidence/speed.md has their errors)  [default: as the preset has it]",
+        help="Resolution of a 3D worm of rods: accurate, fast or preview; docs/evidence/speed.md has their errors"
+        "  [default: the preset's]",
     ),
 ]
 ArenaName = Annotated[
@@ -88,8 +88,8 @@ ArenaName = Annotated[
         "--arena",
         metavar="ARENA|FILE.toml|FILE.xml",
         autocompletion=arenas_from,
-        help="Put the 3D worm elsewhere: a name of `annelid list arenas`, a TOML file, or a scene of your own as MJCF"
-        " [default: where the preset is]",
+        help="Where the 3D worm crawls: a name of `annelid list arenas`, a TOML file, or a scene as MJCF (.xml)"
+        "  [default: the preset's]",
     ),
 ]
 Jobs = Annotated[
@@ -99,8 +99,9 @@ SchedulerAddress = Annotated[
     str | None,
     typer.Option(
         metavar="ADDRESS",
-        help="Have a Dask scheduler's workers compute the runs: tcp://HOST:PORT, tls://HOST:PORT, or its scheduler"
-        " file (.json). It runs code as you: name only what you trust  [default: processes of this machine]",
+        help="Compute the runs on the workers of this Dask scheduler: tcp://HOST:PORT, tls://HOST:PORT, or its"
+        " scheduler file (.json). It can run code in your name, so you must trust it"
+        "  [default: processes of this machine]",
     ),
 ]
 Output = Annotated[Path, typer.Option("--output", "-o", help="Folder of the results and the runs.")]

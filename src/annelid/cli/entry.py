@@ -40,7 +40,7 @@ EXIT_INTERRUPTED = 130
 
 PANELS = ("Make", "See", "Vary", "Exchange", "Robot", "Studies", "Help")
 """Headings of the help, below which the commands stand in the order in which they join."""
-_OLD: Mapping[str, tuple[str, ...]] = {
+OLD_COMMANDS: Mapping[str, tuple[str, ...]] = {
     "build": ("export", "--to", "mjcf"),
     "experiment": ("study",),
     "pseudo-robot": ("loop", "--pseudo"),
@@ -48,7 +48,7 @@ _OLD: Mapping[str, tuple[str, ...]] = {
     **{name: ("list", name) for name in ("presets", "arenas", "runs")},
     **{name: ("study", name) for name in ("limit-cycle", "bench", "robustness", "challenge")},
 }
-"""What commands of before are now; they go on for one release."""
+"""What commands of before are now; they go on for one release (docs/roadmap.md lists them)."""
 WIDEST = 200
 """Characters of a command's line in the help, which goes on in the next line and is never cut."""
 
@@ -90,7 +90,7 @@ class _Sentences(_Panels):
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Finds a command, by its old name with a hint."""
-        if (now := _OLD.get(args[0])) is not None:
+        if (now := OLD_COMMANDS.get(args[0])) is not None:
             complain(f"hint: annelid {args[0]} is now annelid {' '.join(now)}; the old name goes with the next release")
             args = [*now, *args[1:]]
         return super().resolve_command(ctx, args)
@@ -261,15 +261,15 @@ def _start(
         bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version.")
     ] = False,
 ) -> None:
-    """Simulate a soft, peristaltic earthworm robot driven by a synthetic nervous system.
+    """Simulate a soft earthworm robot that crawls by peristalsis and is driven by a synthetic nervous system.
 
     \b
-    annelid run                        run the paper's worm as rods: a few seconds
-    annelid run riddle2023             run it as the paper built it: about a minute
-    annelid run riddle2022-planar      run the planar worm: a few seconds
-    annelid list presets               what else there is
-    annelid study paper                reproduce and examine the whole paper: about 40 minutes
-    annelid doctor                     is everything in place?
+    annelid run                        the paper's worm: a few seconds
+    annelid run riddle2023             in the paper's own formulation: a minute
+    annelid run riddle2022-planar      the planar worm: a few seconds
+    annelid list presets               all worms
+    annelid study paper                the report on the whole paper: an hour
+    annelid doctor                     what is missing on this machine
 
     Exit codes: 0 done, 2 refused, 3 stopped by a guard, 4 runs failed, 5 all runs failed, 130 interrupted, 1 anything
     unexpected. With --json, a command prints its result as one JSON document.

@@ -19,7 +19,7 @@ from typing import Annotated, Any
 
 import typer
 
-_HELP = "Print the result as one JSON document, and nothing else on stdout; docs/data_out.md lists its keys."
+_HELP = "Print only one JSON document with the result; docs/data_out.md lists its keys."
 _Json = Annotated[bool, typer.Option("--json", help=_HELP)]
 _OPTION = inspect.Parameter("as_json", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=_Json)
 _documents: ContextVar[list[Any] | None] = ContextVar("_documents", default=None)

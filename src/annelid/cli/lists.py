@@ -24,8 +24,8 @@ def presets_command(
 ) -> None:
     """List the presets, or print one.
 
-    Each field has its source; what the preset extends stands behind it as comments. What the command prints is a start
-    for a file of your own. With --fields it lists all fields of the worm with their values and meanings.
+    A preset is printed as a file that you can change, with the source of every number. The presets that it extends
+    follow as comments. With --fields all fields of the worm are listed with their values and meanings.
 
     \b
     annelid list presets
@@ -66,8 +66,8 @@ def numbers_command() -> None:
     """List the numbers of a run: name, unit, and what each is.
 
     A name is the same in `annelid show --json`, in the files of a sweep, in tables as CSV, and in Python:
-    annelid.summary(run).period_s. Of a number for each segment there is a list. A sweep may output all but those that
-    are marked as words.
+    annelid.summary(run).period_s. A number that each segment has is a list. A sweep may output all numbers that are not
+    marked as words.
 
     \b
     annelid list numbers
@@ -89,7 +89,7 @@ def arenas_command(
 ) -> None:
     """List the arenas for a 3D worm, or print one.
 
-    What it prints is a start for a file of your own; any field can be set with --set.
+    Save what it prints as a file of your own and change it, or set any field with --set.
 
     \b
     annelid list arenas
@@ -122,7 +122,7 @@ def _print_table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None
 def runs_command(
     folder: Annotated[Path, typer.Argument(help="Folder to look in, with all folders below it.")] = Path("runs"),
 ) -> None:
-    """List the runs that are there.
+    """List the runs below a folder.
 
     Prints the folder, preset, simulated time, size, date and end of every run and of every outcome that a study kept.
 

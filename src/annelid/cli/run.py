@@ -45,7 +45,7 @@ def run_command(
     ] = None,
     resume: Annotated[
         Path | None,
-        typer.Option(metavar="RUN", help="Continue this run from where it ended; --duration counts from its start."),
+        typer.Option(metavar="RUN", help="Continue this run from its end; --duration counts from its start."),
     ] = None,
     uncertainty: Annotated[
         int | None,
@@ -53,7 +53,7 @@ def run_command(
             min=2,
             max=10_000,
             metavar="N",
-            help="Give the numbers error bars: from N Monte Carlo samples, from finer steps and more elements.",
+            help="Give the numbers error bars: from N Monte Carlo samples, finer steps and more elements.",
         ),
     ] = None,
     uncertainty_from: Annotated[
@@ -73,7 +73,8 @@ def run_command(
     check: Annotated[
         bool,
         typer.Option(
-            "--check", help="Run it also at half the step and with one more element; say how far each number moves."
+            "--check",
+            help="Run it also at half the step and with one more element, and show how far each number moves.",
         ),
     ] = False,
     jobs: Annotated[
@@ -89,28 +90,29 @@ def run_command(
     Writes run.nc, figure7.png, frame.png and video.mp4, and prints a table.
 
     \b
-    annelid run                                              the paper's worm, in seconds
-    annelid run riddle2023                                   the paper's own formulation, in a minute
-    annelid run riddle2023-rods --segments 4                 four segments, with rigid crossings
-    annelid run --set arena.friction=0.3                     any field of any preset
-    annelid run --arena pipe.bend --set arena.radius=0.8     elsewhere: annelid list arenas lists the places
-    annelid run my.toml --duration 20 --out long             your own file, your own folder
-    annelid run --resume long --duration 40                  twenty seconds more
-    annelid run riddle2023-rods --check                      how far its numbers depend on step and mesh
+    annelid run                                the paper's worm, in seconds
+    annelid run riddle2023                     its own formulation: a minute
+    annelid run riddle2023-rods --segments 4   four segments, rigid crossings
+    annelid run --set arena.friction=0.3       any field of any preset
+    annelid run --arena pipe.bend              another place: annelid list arenas
+    annelid run my.toml --duration 20 -o long  your own file, your own folder
+    annelid run --resume long --duration 40    twenty seconds more
+    annelid run riddle2023-rods --check        how well it is resolved
 
-    With --check the table says how far each number moves at half the step or with one more element a side, and marks
-    what moves by more than 10 %; check.json has both changes. It takes about four times as long as the run.
+    --check repeats the run at half the step, and with one more element per side. The table then says how far each
+    number moves, and marks changes above 10 %. check.json has both changes. This takes about four times as long as the
+    run.
 
-    With --uncertainty it also writes uncertainty.json, .csv and .png, and prints every number with its error. N worms
-    are drawn with the errors and correlations of a fit to the load frame; the run is repeated at a half and a
-    quarter of its physics step, and with one and two more elements a side (docs/uncertainty.md). All runs are kept
-    below the folder: the same command with the same --out goes on where it was stopped.
+    --uncertainty N prints every number with its error, and writes uncertainty.json, .csv and .png. It runs N worms,
+    drawn with the errors and correlations of a fit to the load frame. It also repeats the run at a half and a quarter
+    of the physics step, and with one and two more elements per side. All runs are kept below the folder, so the same
+    command with the same --out continues where it was stopped (docs/uncertainty.md).
 
     \b
-    annelid run riddle2023-rods --uncertainty 8 --out walk   12 runs, a few seconds each
-    annelid run wang --uncertainty 8 --out wang              the robot: several minutes
-    annelid run riddle2023-rods --uncertainty 8 --vary floor_friction=0.2    friction with the floor known to 20 %
-    annelid run riddle2023-rods --uncertainty 8 --uncertainty-from calibration/calibration.json
+    annelid run riddle2023-rods --uncertainty 8 -o walk    12 runs, seconds each
+    annelid run wang --uncertainty 8 -o wang               several minutes
+    annelid run wang --uncertainty 8 --vary floor_friction=0.2
+    annelid run wang --uncertainty 8 --uncertainty-from mine/calibration.json
     """
     from annelid.config import load_config
     from annelid.draw.gallery import draw_all

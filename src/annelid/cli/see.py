@@ -37,15 +37,15 @@ if TYPE_CHECKING:
 def show_command(
     run: RunPath,
     verify: Annotated[
-        bool, typer.Option("--verify", help="Only say whether every byte of the file is as it was when the run ended.")
+        bool, typer.Option("--verify", help="Only check whether any byte of the file has changed since the run ended.")
     ] = False,
 ) -> None:
     """Print the numbers of a run.
 
-    Beside them stand the published ones, where there are any.
+    Published numbers stand beside them where there are any.
 
-    A run that has ended carries a digest of all its bytes. Files up to 64 MB are compared with theirs whenever they
-    are opened, larger ones with --verify only.
+    A run that has ended contains a digest of all its bytes. Files up to 64 MB are compared with it whenever they are
+    opened, larger ones only with --verify.
 
     \b
     annelid show runs/riddle2023-001
@@ -84,8 +84,8 @@ def draw_command(
         typer.Option("--output", "-o", help="Figure or frame to write  [default: FIGURE.png or frame.png in the run]"),
     ] = None,
     video: Annotated[Path | None, typer.Option(help="Draw a video: .mp4, .mov, .mkv, .gif")] = None,
-    fps: Annotated[float, typer.Option(help="Frames a second of the video, 1 to 240.")] = 25.0,
-    speed: Annotated[float, typer.Option(help="Simulated seconds a second of video.")] = 1.0,
+    fps: Annotated[float, typer.Option(help="Frames per second of the video, 1 to 240.")] = 25.0,
+    speed: Annotated[float, typer.Option(help="Simulated seconds per second of video.")] = 1.0,
     camera: Annotated[
         str | None, typer.Option(help="isometric, side, top, front or course  [default: isometric]")
     ] = None,
@@ -96,10 +96,10 @@ def draw_command(
 ) -> None:
     """Draw a run: a figure, a frame or a video.
 
-    Figures are .png, .pdf or .svg: the counterpart of the paper's figure 7; the paths of the worm's middle and front
-    with its outline at several times; or the network of its controller, with a key. Frames come from the recorded
-    postures: later, and on any machine. Of a 3D worm they carry a legend, the time, and a scale bar that is right at
-    the distance of the worm's middle.
+    Figures are .png, .pdf or .svg. figure7 has potentials and lengths, as in the paper. track has the paths of the
+    worm's middle and front, with its outline at several times. network has the neurons and synapses of the controller,
+    with a key. Frames are drawn from the recorded postures, so this works later and on any machine. Those of a 3D worm
+    have a legend, the time and a scale bar. The bar is right at the distance of the worm's middle.
 
     \b
     annelid draw runs/riddle2023-001 -o figure7.pdf
@@ -152,35 +152,36 @@ def view_command(
     segments: Segments = None,
     fidelity: FidelityLevel = None,
     arena: ArenaName = None,
-    speed: Annotated[float, typer.Option(min=0.05, max=10.0, help="Simulated seconds a second at the start.")] = 1.0,
+    speed: Annotated[float, typer.Option(min=0.05, max=10.0, help="Simulated seconds per second at the start.")] = 1.0,
     export: Annotated[
         Path | None,
-        typer.Option(metavar="FILE.html", help="Write one HTML page that opens from disk and plays, and show nothing."),
+        typer.Option(metavar="FILE.html", help="Write one HTML page that plays the run from disk, and show nothing."),
     ] = None,
     open_browser: Annotated[bool, typer.Option("--open/--no-open", help="Open the page in the browser.")] = True,
     host: Annotated[
-        str, typer.Option(help="Address to listen on; 0.0.0.0 lets in other machines that know the token.")
+        str,
+        typer.Option(help="Address to listen on; with 0.0.0.0 other machines that know the token can open the page."),
     ] = "127.0.0.1",
     port: Annotated[
         int | None,
-        typer.Option(min=0, max=65535, help="Port; 0 for any that is free  [default: 8080, or any if it is taken]"),
+        typer.Option(min=0, max=65535, help="Port; 0 for any free one  [default: 8080, or any if it is taken]"),
     ] = None,
     force: Force = False,
 ) -> None:
     """Watch a worm in the browser as it runs, or play a run.
 
-    Shows the mesh, ring muscles coloured by activation, springs by strain, the forces of the ground, and the neurons
-    of the last five seconds. Sliders change friction, stiffness, sensors and drive of the running worm; a click
-    pokes it. A recorded run is played the same way. Needs viser: pip install "annelid[view]". Nothing is loaded from
-    the network, and the page is for this machine only unless --host says otherwise. Ctrl-C ends it.
+    The page shows the mesh, ring muscles coloured by activation, springs coloured by strain, forces of the ground, and
+    the last five seconds of the neurons. Sliders change friction, stiffness, sensors and drive of the running worm; a
+    click pokes it. A recorded run is played in the same page. It needs viser: pip install "annelid[view]". Nothing is
+    loaded from the network, and only this machine can open the page unless --host is given. Ctrl-C ends it.
 
     \b
     annelid view                                         riddle2023-rods, live
-    annelid view riddle2025-adaptive --arena pipe.taper  another one, elsewhere
-    annelid view --set arena.friction=0.3 --speed 0.5    changed, in slow motion
-    annelid view runs/riddle2023-rods-001                a run, as it was recorded
-    annelid compare runs/riddle2023-rods-001 robot.csv --map robot.toml --view   with a robot's log beside it
-    annelid view runs/riddle2023-rods-001 --export walk.html   as one page to send by mail
+    annelid view riddle2025-adaptive --arena pipe.taper  in a narrowing pipe
+    annelid view --set arena.friction=0.3 --speed 0.5    changed, slow motion
+    annelid view runs/riddle2023-rods-001                a recorded run
+    annelid view runs/riddle2023-rods-001 --export walk.html  a page to send
+    annelid compare RUN robot.csv --map robot.toml --view  with a robot's log
     """
     worm: RunConfig | Run
     if source and not names_worm(source) and Path(source).exists():
@@ -244,22 +245,27 @@ def export_command(
     """Write a run for other programs: tables, NWB, HTML, MJCF.
 
     \b
-    csv      a table for all signals of the same dimensions, units in the header; about.json says what the run is
-    mat      one MATLAB file: a variable for each signal; structs with units, labels and the configuration
-    parquet  the same tables as csv, units in the metadata (pip install 'annelid[export]')
-    nwb      Neurodata Without Borders: potentials as intracellular series, behaviour and positions beside
-             (pip install 'annelid[export]')
-    html     one page that needs nothing else: numbers, figures, configuration, what to cite
-    mjcf     the model for plain MuJoCo, the last state as a keyframe; of a worm that was not run with a keyframe rest
-             where it has servos, to be loaded before the first step: in it their cables are paid out
+    csv      one table for all signals of the same dimensions, units in the
+             header; about.json describes the run
+    mat      one MATLAB file: a variable for each signal; structs with units,
+             labels and configuration
+    parquet  the tables of csv, units in the metadata
+    nwb      Neurodata Without Borders: potentials as intracellular series,
+             with behaviour and positions
+    html     one page that needs no other file: numbers, figures,
+             configuration, what to cite
+    mjcf     the model for plain MuJoCo, with the last state as a keyframe;
+             of a preset with servos the keyframe is rest: load it before the
+             first step, so that the cables start at their full length
 
-    A video is drawn by annelid draw, a network or a whole controller written by annelid export-network.
+    parquet and nwb need pip install "annelid[export]". annelid draw makes videos. annelid export-network writes a
+    network or a whole controller.
 
     \b
-    annelid export runs/riddle2023-rods-001 --to csv
-    annelid export runs/riddle2023-rods-001 --to csv --signals ring_length,muscle_force -o rings.csv
-    annelid export runs/riddle2023-rods-001 --to mat --every 10 --from-time 2 --to-time 4 -o two_seconds.mat
-    annelid export runs/riddle2023-rods-001 --to html -o report.html
+    annelid export runs/walk --to csv
+    annelid export runs/walk --to csv --signals ring_length -o rings.csv
+    annelid export runs/walk --to mat --every 10 --from-time 2 --to-time 4
+    annelid export runs/walk --to html -o report.html
     annelid export riddle2025 --arena pipe.s --to mjcf -o worm_in_pipe.xml
     """
     from annelid.draw.gallery import task_bar
@@ -314,16 +320,16 @@ def cite_command(
         str | None,
         typer.Argument(
             metavar="[RUN|PRESET|FILE.toml]",
-            help="What was used  [default: only annelid and the paper behind it]",
+            help="What you used  [default: only annelid and the paper that it reproduces]",
             autocompletion=worms_from,
         ),
     ] = None,
     everything: Annotated[bool, typer.Option("--all", help="Print every entry that annelid knows.")] = False,
 ) -> None:
-    """Print BibTeX of what a run or a preset rests on.
+    """Print the references of a run or a preset as BibTeX.
 
-    Above each entry stands what it is cited for. Fields that annelid does not know for certain are left out, and
-    the entry's note says which to complete.
+    A comment above each entry says what it is cited for. Fields that annelid does not know for certain are left out.
+    The entry's note says which to complete.
 
     \b
     annelid cite

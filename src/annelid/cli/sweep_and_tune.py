@@ -25,9 +25,7 @@ from annelid.cli.json_output import refuse_json
 
 @command("sweep", "Vary")
 def sweep_command(
-    study: Annotated[
-        Path | None, typer.Argument(metavar="STUDY.toml", help="What is varied, and how; --example prints one.")
-    ] = None,
+    study: Annotated[Path | None, typer.Argument(metavar="STUDY.toml", help="The study; --example prints one.")] = None,
     output: Output = Path("sweep"),
     scheduler: SchedulerAddress = None,
     jobs: Jobs = None,
@@ -40,21 +38,23 @@ def sweep_command(
             min=0, max=1_000_000, metavar="N", help="Runs to repeat at half the step and with one more element."
         ),
     ] = 0,
-    example: Annotated[bool, typer.Option("--example", help="Print a study with comments, to begin with.")] = False,
+    example: Annotated[
+        bool, typer.Option("--example", help="Print a study with comments, as a start for your own.")
+    ] = False,
     quiet: Quiet = False,
 ) -> None:
     """Vary fields over a grid or in samples.
 
-    A study names a preset, fields that are the same in every run, and fields that are varied: over numbers, choices or
-    ranges, in every combination or as random, Latin hypercube or Sobol samples.
+    A study is a TOML file. It names a preset, fields that are the same in every run, and fields that are varied over
+    numbers, choices or ranges. It runs every combination, or random, Latin hypercube or Sobol samples.
 
-    Writes sweep.nc, one labelled dataset with every number of summary and gait; sweep.csv, one row per run; sweep.png
-    and .svg. Runs are kept: a second call computes what is missing or has failed, one with more samples adds to them. A
-    run that cannot be built, or whose workers die again and again, is listed with its reason, and the sweep goes on.
-    Several machines need the extra: pip install 'annelid[sweep]'; docs/sweeps.md has them, and Slurm.
+    Writes sweep.nc, one labelled dataset with all numbers; sweep.csv, one row per run; sweep.png and .svg. Runs are
+    kept. A second call computes only what is missing or has failed, and one with more samples adds to them. A run that
+    cannot be built, or whose workers die repeatedly, is listed with its reason, and the sweep goes on. Several machines
+    need pip install "annelid[sweep]"; docs/sweeps.md describes them, and Slurm.
 
-    With --check N, N complete runs, spread evenly over the sweep, run also at half the step and with one more element a
-    side. A sentence at the end says which of them are not resolved; the column check of sweep.csv says what moves, and
+    --check N repeats N complete runs, spread evenly over the sweep, at half the step and with one more element per
+    side. A sentence at the end names those that are not resolved. The column check of sweep.csv says what moves, and
     what to try.
 
     \b
@@ -62,7 +62,7 @@ def sweep_command(
     annelid sweep study.toml
     annelid sweep study.toml --scheduler tcp://10.0.0.1:8786
     annelid sweep study.toml --samples 512
-    annelid sweep study.toml --check 4                 do its results depend on step and mesh?
+    annelid sweep study.toml --check 4      do step and mesh change its results?
     """
     refuse_json(example, "--example")
     if example:
@@ -107,15 +107,15 @@ def tune_command(
     duration: Annotated[
         float | None, typer.Option(help="Simulated time of each run, s.  [default: the preset's]")
     ] = None,
-    trials: Annotated[int, typer.Option(min=1, max=1_000_000, help="Runs that the search may take.")] = 100,
+    trials: Annotated[int, typer.Option(min=1, max=1_000_000, help="Number of runs of the search.")] = 100,
     seed: Annotated[int, typer.Option(min=0, max=2**32 - 1, help="Seed of the optimiser.")] = 0,
     numerics: Annotated[
         float | None,
         typer.Option(
             min=0.0,
             metavar="SHARE",
-            help="Largest share of the muscles' work, 0.1 for 10 %, that the integrator may take or add; more is no"
-            " gait.  [default: any]",
+            help="Refuse a gait if the integrator takes or adds more than this share of the muscles' work, such as 0.1"
+            "  [default: any]",
         ),
     ] = None,
     jobs: Jobs = None,
@@ -125,17 +125,17 @@ def tune_command(
     """Search for a faster, cheaper or less slipping gait.
 
     An optimiser (a tree-structured Parzen estimator) varies fields of controller and body. Every run is judged over its
-    complete cycles; one that stops, falls silent or out of order, or does not advance counts as no speed, a cost of
-    transport of 100 and a slip ratio of 10.
+    complete cycles. A run that stops, falls silent, is out of order or does not advance counts as speed 0, cost of
+    transport 100 and slip ratio 10.
 
-    Writes after every generation: best.toml, which `annelid run` takes; trials.csv; tuning.png and .svg; with two
-    objectives also front/, a file for each gait of the Pareto front. Runs are kept, so that a second call, also one
-    with more trials, goes on where the first was stopped. Needs the extra: pip install 'annelid[tune]'.
+    Writes after every generation: best.toml, which `annelid run` takes; trials.csv; tuning.png and .svg. With two
+    objectives it also writes the folder front, with a file for each gait of the Pareto front. Runs are kept, so a
+    second call continues the search, also with more trials. It needs pip install "annelid[tune]".
 
     \b
     annelid tune riddle2025-muscles
-    annelid tune riddle2025-muscles --vary controller.gate_time_constant_ms=80:600:log --vary sensor.tolerance_m=0:0.02
-    annelid tune riddle2025 --objective speed --objective slip --trials 200 -o front
+    annelid tune riddle2025-muscles --vary sensor.tolerance_m=0:0.02
+    annelid tune riddle2025 --objective speed --objective slip --trials 200
     annelid run tune/best.toml
     """
     from annelid.experiment import tune

@@ -13,8 +13,8 @@ from annelid.errors import ConfigError, require_at_least, require_positive, sugg
 COARSE = "coarse"
 COARSE_BASE = "fast"
 COARSE_CHANGES: Mapping[str, Any] = {"body.mesh.elements_per_side": 1, "clock.physics_timestep_s": 0.02}
-"""The default resolution: level `fast` with 0.43 of its coordinates and twice its step; docs/environments.md has its
-cost."""
+"""The default resolution: level `fast` with 0.43 of its coordinates and twice its step; docs/evidence/environments.md
+has its cost."""
 FIDELITIES = (COARSE, *LEVELS)
 UNUSED = ("controller", "turning", "record", "duration", "seed", "clock.control")
 """Beginnings of fields that an environment has no use for: the agent acts, and nothing is recorded."""

@@ -41,30 +41,34 @@ def calibrate_command(
     ] = None,
     jobs: Jobs = None,
     scheduler: SchedulerAddress = None,
-    example: Annotated[bool, typer.Option("--example", help="Print the study of the robot, to begin with.")] = False,
+    example: Annotated[
+        bool, typer.Option("--example", help="Print the study of the authors' robot, as a start for your own.")
+    ] = False,
     quiet: Quiet = False,
     force: Force = False,
 ) -> None:
     """Identify a robot from several measured experiments at once.
 
-    A study names a worm, parameters with their bounds, and experiments with their data, beside it or below it:
+    A study names a worm, parameters with their bounds, and experiments with their data files. Paths count from its
+    folder.
 
     \b
-    tensile       force over the elongation of the strands' tube
-    load-frame    force over the displacement of a ring's cable, there and back
-    ring-down     a strand that is bent, released, and rings down
-    walk          the log of a walking robot, with a map, as annelid compare takes it
+    tensile     force over the elongation of the strands' tube
+    load-frame  force over the displacement of a ring's cable, there and back
+    ring-down   a strand that is bent, released, and vibrates
+    walk        the log of a walking robot, with a map as for annelid compare
 
-    Writes calibration.json, with values, 95 % intervals, correlations and the size of what the model leaves out;
-    calibration.png and .svg; and calibrated.toml, the fitted worm. Tests of worms are kept, so the same command
-    continues one that was interrupted. A study with a load frame takes some minutes. Without a study, the tube and
-    one segment of the robot are fitted.
+    Writes calibration.json, with values, 95 % intervals, correlations and the size of the model error; calibration.png
+    and .svg; and calibrated.toml, the fitted worm. Simulated experiments are kept, so the same command continues after
+    an interruption. A study with a load frame takes some minutes. Without a study, the tube and one segment of the
+    authors' robot are fitted.
 
     \b
     annelid calibrate --example > study.toml
     annelid calibrate study.toml -o mine
-    annelid calibrate --free young_modulus --free spring_rate --free dry_friction --free cable_friction
-    annelid run mine/calibrated.toml --uncertainty 8 --uncertainty-from mine/calibration.json
+    annelid calibrate --free young_modulus --free spring_rate
+    annelid run mine/calibrated.toml --uncertainty 8 \\
+        --uncertainty-from mine/calibration.json
     """
     from annelid_lab.calibration.report import REPORT, identify, tables, write_identified
     from annelid_lab.calibration.simulations import Simulations

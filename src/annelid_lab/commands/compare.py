@@ -20,19 +20,19 @@ def compare_command(
             metavar="RUN RUN..",
             autocompletion=runs_from,
             show_default=False,
-            help="Folders of runs, or their run.nc; differences are to the first. With --map: a run and a table.",
+            help="Folders of runs, or their run.nc; differences are to the first. With --map: a run and a log.",
         ),
     ] = None,
     log_map: Annotated[
         Path | None,
-        typer.Option("--map", metavar="MAP.toml", help="Compare with measured data: what the table's columns are."),
+        typer.Option(
+            "--map", metavar="MAP.toml", help="Compare with a measured log; the map says what its columns are."
+        ),
     ] = None,
     map_for: Annotated[
         Path | None, typer.Option("--map-for", metavar="LOG", help="Print a map for a log, to complete and edit.")
     ] = None,
-    from_time: Annotated[
-        float, typer.Option(help="With --map: time of the run before which nothing is compared, s.")
-    ] = 0.0,
+    from_time: Annotated[float, typer.Option(help="With --map: compare from this time of the run on, s.")] = 0.0,
     output: Annotated[
         Path | None,
         typer.Option("--output", "-o", help="Folder for the figures and comparison.json  [default: only print]"),
@@ -43,23 +43,23 @@ def compare_command(
     ] = False,
     force: Force = False,
 ) -> None:
-    """Lay runs side by side: numbers, differences, figures.
+    """Compare runs with each other, or a run with a measured log.
 
     Prints the numbers of every run with their differences to the first, and the fields in which the configurations
-    differ. What a run lacks is a dash, so worms of any kinds can be compared. With -o it draws all runs into one
-    figure each: lengths.png, travel.png, and potentials.png with --potentials.
+    differ. A dash means that the run lacks the number, so worms of any kinds can be compared. With -o it draws all runs
+    into one figure each: lengths.png, travel.png, and potentials.png with --potentials.
 
     \b
     annelid compare runs/riddle2023-rods-001 runs/riddle2023-rods-002
-    annelid compare runs/riddle2023-rods-001 runs/riddle2022-planar-001 -o comparison
+    annelid compare runs/first runs/second -o comparison
     annelid compare runs/* --json | jq .numbers.period_s
     annelid compare --map-for robot.csv > robot.toml
     annelid compare runs/wang-001 robot.csv --map robot.toml -o robot
     annelid compare runs/wang-001 robot.csv --map robot.toml --view
 
-    With --map the second file is a measured log: CSV, Parquet, MATLAB, netCDF, or the points of a video tracker.
-    Both are aligned in time, and every signal's error, amplitude, phase and duty are printed; -o adds
-    agreement.json and agreement.png. docs/how_to/measured_data.md describes map and numbers.
+    With --map the second file is a measured log: CSV, Parquet, MATLAB, netCDF, or the points of a video tracker. Run
+    and log are aligned in time. The table has error, amplitude, phase and duty of every signal, and -o adds
+    agreement.json and agreement.png. docs/how_to/measured_data.md describes the map and the numbers.
     """
     runs = runs or []
     if map_for is not None:

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 _LINE = "a serial port as PORT@BAUD, or udp:HOST:PORT"
 Ticks = Annotated[
     tuple[int, int],
-    typer.Option(metavar="RELAXED CONTRACTED", help="Servo positions at activation 0 and 1, of 0 .. 4095."),
+    typer.Option(metavar="RELAXED CONTRACTED", help="Servo positions at activation 0 and 1, from 0 to 4095."),
 ]
 Potentiometer = Annotated[
     tuple[float, float],
@@ -49,7 +49,7 @@ def loop_command(
     servos: Annotated[
         str | None,
         typer.Option(
-            metavar="LINE", help="A robot of servos in the manner of Dynamixel 2.0: a serial port as PORT@BAUD."
+            metavar="LINE", help="A robot of servos with the protocol Dynamixel 2.0: a serial port as PORT@BAUD."
         ),
     ] = None,
     firmware: Annotated[
@@ -58,14 +58,16 @@ def loop_command(
     pseudo: Annotated[
         bool, typer.Option("--pseudo", help="A simulated robot of servos, to try it without one.")
     ] = False,
-    rate: Annotated[float, typer.Option(help="Exchanges in a second.", min=1.0, max=10_000.0)] = 100.0,
+    rate: Annotated[float, typer.Option(help="Exchanges per second.", min=1.0, max=10_000.0)] = 100.0,
     watchdog: Annotated[
-        int, typer.Option(min=1, max=10_000, help="Stop after so many periods without a valid answer.")
+        int, typer.Option(min=1, max=10_000, help="Stop after this number of periods without a valid answer.")
     ] = 10,
-    least: Annotated[float, typer.Option(help="Least activation that is sent to a robot, a share of all.")] = 0.0,
-    most: Annotated[float, typer.Option(help="Largest activation that is sent to a robot, a share of all.")] = 1.0,
+    least: Annotated[
+        float, typer.Option(help="Smallest activation that is sent to a robot, a share from 0 to 1.")
+    ] = 0.0,
+    most: Annotated[float, typer.Option(help="Largest activation that is sent to a robot, a share from 0 to 1.")] = 1.0,
     most_rate: Annotated[
-        float | None, typer.Option(help="Largest change of activation that is sent in a second  [default: no limit]")
+        float | None, typer.Option(help="Largest change of activation per second  [default: no limit]")
     ] = None,
     ticks: Ticks = _TICKS,
     potentiometer: Potentiometer = _POTENTIOMETER,
@@ -79,21 +81,21 @@ def loop_command(
     force: Annotated[bool, typer.Option("--force", help="Replace the run that is in the folder.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress bar and no tables.")] = False,
 ) -> None:
-    """Run a robot, firmware, or both, at the pace of the wall clock, and record it as a run.
+    """Run a robot, firmware, or both in real time, and record it as a run.
 
     With a robot, the preset's controller drives it. With firmware, as `annelid export-network --wire` writes it, the
     firmware drives the preset's simulated body. With both, the firmware drives the robot. Writes run.nc, for `annelid
     show` and `annelid compare`, and loop.csv: latency and jitter, missed deadlines and lost answers.
 
-    The robot is sent zero activation and a stop at the end, on Ctrl-C, when the watchdog's time is over, and when
-    anything else goes wrong; docs/wire.md describes the protocol, and what stops it.
+    At the end the robot is sent zero activation and a stop. The same happens on Ctrl-C, after the time of the watchdog,
+    and after any error. docs/wire.md describes the protocol, and what stops a robot.
 
     \b
-    annelid loop riddle2023-rods --servos /dev/ttyUSB0@1000000           a robot of servos
-    annelid loop riddle2023-rods --robot udp:192.168.1.7:4242 --rate 50  a robot with a protocol of annelid's
-    annelid loop riddle2023-rods --firmware /dev/ttyACM0                 a microcontroller and the simulated worm
-    annelid loop riddle2023-rods --servos /dev/ttyUSB0 --most 0.6 --most-rate 2   gently
-    annelid loop riddle2023-rods --pseudo                                without hardware: a robot of servos, simulated
+    annelid loop riddle2023-rods --pseudo                 without hardware
+    annelid loop riddle2023-rods --servos /dev/ttyUSB0@1000000
+    annelid loop riddle2023-rods --servos /dev/ttyUSB0 --most 0.6   gently
+    annelid loop riddle2023-rods --robot udp:192.168.1.7:4242 --rate 50
+    annelid loop riddle2023-rods --firmware /dev/ttyACM0  simulated worm
     """
     from annelid.output import write_csv
     from annelid.simulation import build_plant

@@ -20,7 +20,9 @@ def export_network_command(
     to: Annotated[str, typer.Option(metavar="FORMAT", help="c, lems or toml.")] = "c",
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", help="Folder of c, or file  [default: firmware, network.xml or network.toml]"),
+        typer.Option(
+            "--output", "-o", help="Folder for c, else a file  [default: firmware, network.xml or network.toml]"
+        ),
     ] = None,
     single: Annotated[
         bool, typer.Option("--float/--double", help="Type of all numbers in the C code.", show_default="double")
@@ -35,18 +37,21 @@ def export_network_command(
         str | None, typer.Option(help="Scheme of a network in C: euler, toolbox or heun  [default: euler]")
     ] = None,
     wire: Annotated[
-        bool, typer.Option("--wire", help="Also write what answers `annelid loop` over a serial line or UDP.")
+        bool, typer.Option("--wire", help="Also write the code that answers `annelid loop` over a serial line or UDP.")
     ] = False,
     force: Force = False,
 ) -> None:
     """Write a network for other programs, or a worm's whole controller for a microcontroller.
 
     \b
-    c     C99: of a preset or a configuration the controller with its sensors' thresholds, its start and the
-          muscles' activation; of a network from the currents of its inputs to the potentials of its outputs.
-          A header, a source file and a self-test
-    lems  LEMS, the language of NeuroML 2, for pyLEMS and jNeuroML: the network alone, of a preset too
-    toml  the network alone as Network.to_toml writes it
+    c     C99 with a self-test: a header and a source file.
+          Of a preset or a configuration: the controller, with the thresholds
+          of its sensors, its start and the activation of the muscles.
+          Of a network: from the currents of its inputs to the potentials of
+          its outputs.
+    lems  LEMS, the language of NeuroML 2, for pyLEMS and jNeuroML: the
+          network alone
+    toml  the network alone, as Network.to_toml writes it
 
     \b
     annelid export-network riddle2022-planar -o firmware

@@ -14,21 +14,23 @@ from annelid.cli import Force, command, print_paths, refuse_existing
 def new_command(
     path: Annotated[Path, typer.Argument(metavar="FILE.toml", help="The file to write.")],
     radius: Annotated[float, typer.Option(help="Radius of the tube at rest, m.")] = 0.16,
-    segments: Annotated[int, typer.Option(help="Segments, from 3 on.")] = 3,
-    helices: Annotated[int, typer.Option(help="Strands, half of each handedness; even, from 6 on.")] = 12,
+    segments: Annotated[int, typer.Option(help="Number of segments, at least 3.")] = 3,
+    helices: Annotated[
+        int, typer.Option(help="Number of strands, half of them in each direction: even, at least 6.")
+    ] = 12,
     length: Annotated[
-        float | None, typer.Option(help="Length at rest, m.  [default: so that rhombi have the paper's shape]")
+        float | None, typer.Option(help="Length at rest, m  [default: the one at which rhombi have the paper's shape]")
     ] = None,
     rear_radius: Annotated[
-        float | None, typer.Option(help="Radius of the last ring at rest, m.  [default: as --radius, no taper]")
+        float | None, typer.Option(help="Radius of the last ring at rest, m  [default: --radius, no taper]")
     ] = None,
     force: Force = False,
 ) -> None:
     """Write the configuration of a worm of your own size.
 
-    Strands, springs, muscles, sensors, times and limits follow from the geometry, so that the worm moves as the paper's
-    robot of rods does; the file states the rule of each. Replace what you can measure. A geometry that cannot work is
-    refused here.
+    Strands, springs, muscles, sensors, times and limits follow from the geometry, so that the worm moves as
+    riddle2023-rods does. The file states the rule of each number. Replace what you can measure. A geometry that cannot
+    work is refused.
 
     \b
     annelid new mine.toml --radius 0.05 --segments 5 --helices 8 --length 0.4

@@ -19,7 +19,7 @@ from annelid.simulation import Run
 from annelid_studies.challenge.tasks import Entry, Task, all_tasks
 
 STALL_FORCE_N, FREE_SPEED_M_PER_S = 13.0, 0.064
-"""Of the motor: cable force at which the robot's servos stall, and cable speed without load (docs/presets.md, wang)."""
+"""Cable force at which the robot's servos stall, and cable speed without load (docs/evidence/presets.md)."""
 NUMERICAL_SHARE = 0.05
 """Share of the muscles' work that the integrator may take or add; beyond that a run is refused.
 

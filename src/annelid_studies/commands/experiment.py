@@ -87,7 +87,7 @@ def _words() -> Mapping[str, Mapping[str, str]]:
     return parse_toml((files("annelid_studies.commands") / name).read_text(encoding="utf-8"), name)
 
 
-_HALF_STEP = Annotated[bool, typer.Option("--half-step", help="Bodies move in steps half as long.")]
+_HALF_STEP = Annotated[bool, typer.Option("--half-step", help="Use half the physics step.")]
 STUDIES = (
     Study("speed", "crawling", "speed", {"gaits": (_gaits("riddle2025-muscles and crawler"), None)}),
     Study("gaits", "crawling", "gaits", {"gaits": (_gaits("those of the six-segment robot"), None)}),
@@ -115,23 +115,25 @@ def load_frame_command(
         typer.Option(
             min=0.0,
             max=20.0,
-            help="Friction of the cable, a number without unit: coefficient times its wrap angle in rad.",
+            help="Friction of the cable: its coefficient times its wrap angle in rad.",
         ),
     ] = 0.0,
     data: Annotated[
-        Path | None, typer.Option(help="Measured loop to compare with: CSV of mm, N.  [default: the one of annelid]")
+        Path | None, typer.Option(help="Measured loop to compare with: CSV of mm, N  [default: the authors' loop]")
     ] = None,
     quiet: Quiet = False,
     force: Force = False,
 ) -> None:
     """Close one ring by its cable and open it again.
 
-    The middle ring of a weightless worm is wound in slowly and let out; the cable's force is compared with what
-    the authors measured on one segment of the robot. A few seconds. Writes load_frame.csv, .png and .svg.
+    The cable winds in the middle ring of a weightless worm slowly, and lets it out again. The table compares its force
+    with the authors' measurement on one segment of their robot. It takes a few seconds. Writes load_frame.csv, .png and
+    .svg.
 
     \b
     annelid study load-frame
-    annelid study load-frame --set body.strands.young_modulus_Pa=1e9 --set body.joints.dry_friction_Nm=0.01
+    annelid study load-frame --set body.strands.young_modulus_Pa=1e9
+    annelid study load-frame --set body.joints.dry_friction_Nm=0.01
     """
     from annelid.experiment import study_progress
     from annelid_lab import calibration as frame

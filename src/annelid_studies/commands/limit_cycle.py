@@ -31,18 +31,17 @@ def limit_cycle_command(
 ) -> None:
     """Find a planar worm's limit cycle, and how stable it is.
 
-    Follows the worm until its states repeat, then disturbs each state a little at a hundred points of the
-    cycle. Prints the period and the Floquet multipliers: what one cycle leaves of a deviation. All but one
-    below 1 in magnitude: the rhythm comes back by itself; the one at 1 is a shift in time, which stays.
+    It follows the worm until its states repeat, and then disturbs each state a little at a hundred points of the cycle.
+    It prints the period and the Floquet multipliers. A multiplier is the part of a deviation that remains after one
+    cycle. The rhythm is stable if all but one are below 1 in magnitude; the one at 1 is a shift in time, which stays.
 
-    Time is continuous: the worm's equations are integrated between the switches of its sensors and synapses.
-    With --json also the phase response: by how much a kick of a neuron, at each phase, advances the rhythm.
-    It takes about ten seconds for 3 segments, twenty for 6. The body is riddle2022 and the controller sns;
-    default preset: riddle2022-planar.
+    Time is continuous: the equations are integrated between the switches of sensors and synapses. --json adds the phase
+    response: how far a kick of a neuron, at each phase, advances the rhythm. It takes about ten seconds for 3 segments,
+    twenty for 6. The body is riddle2022 and the controller sns.
 
     \b
     annelid study limit-cycle riddle2022-planar --segments 6
-    annelid study limit-cycle --set controller.gate_time_constant_ms=200 --set body.gain=1.9
+    annelid study limit-cycle --set controller.gate_time_constant_ms=200
     annelid study limit-cycle --json | jq .multipliers[0]
     """
     from annelid.terminal import Console

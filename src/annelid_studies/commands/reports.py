@@ -32,30 +32,31 @@ from annelid.errors import RunFileError
 @study("paper")
 def paper_command(
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the report.")] = Path("report"),
-    quick: Annotated[bool, typer.Option("--quick", help="Coarser maps, the same claims: about 6 minutes.")] = False,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="The same claims from coarser maps, in about 6 minutes.")
+    ] = False,
     only: Annotated[
         list[str] | None,
-        typer.Option(metavar="NAME", help="Only this examination, and the main numbers; may be repeated."),
+        typer.Option(metavar="NAME", help="Only the main numbers and this examination; may be repeated."),
     ] = None,
     jobs: Jobs = None,
     scheduler: SchedulerAddress = None,
     claims: Annotated[
-        Path | None, typer.Option(metavar="FILE.md", help="Write the table of claims there as well, as Markdown.")
+        Path | None, typer.Option(metavar="FILE.md", help="Also write the table of claims as Markdown.")
     ] = None,
     quiet: OnlyPaths = False,
 ) -> None:
     """Reproduce the paper's figures and claims, and examine them.
 
-    Writes report.html, one file with all pictures to read and to send, and report.md beside its figures.
-    The whole takes about an hour on two cores, --quick about 6 min. Every run is kept in report/runs, so
-    a second call runs no worm again, and a killed one goes on where it was. Without OpenGL the report
-    leaves out figures 4 and 8, and says so.
+    Writes report.html, one file with all pictures, and report.md with its figures. It takes about an hour on two cores,
+    with --quick about six minutes. Every run is kept in report/runs, so a second call continues where the first was
+    stopped. Without OpenGL the report leaves out figures 4 and 8, and says so.
 
     \b
-    annelid study paper                                      the whole, into the folder report
-    annelid study paper --quick -o draft                     the same claims from coarser maps
-    annelid study paper --only pins --only friction          these examinations only
-    annelid study paper -o report --claims docs/evidence/paper.md     and the table of claims for the repository
+    annelid study paper                              into the folder report
+    annelid study paper --quick -o draft             from coarser maps
+    annelid study paper --only pins --only friction  these examinations only
+    annelid study paper --claims docs/evidence/paper.md  for the repository
     """
     from annelid.output import with_suffix, write_text
     from annelid_studies.riddle2023.paper import reproduce
@@ -94,27 +95,27 @@ def bench_command(
 ) -> None:
     """Measure speed and error side by side.
 
-    Times closed loops with their recording, each in a process of its own on one core, and compares their
-    elongation, period, travel, work and slip with a converged run, three times with slightly different friction.
-    Writes bench.json, with where the time of a step goes, and bench.png and .svg: error against speed, and cost
-    against the number of segments.
+    It times closed loops with their recording, each in its own process on one core. It compares their elongation,
+    period, travel, work and slip with a converged run, three times with slightly different friction. Writes bench.json,
+    with the time of each part of a step, and bench.png and .svg: error against speed, and cost against the number of
+    segments.
 
     \b
-    --cases levels      the levels of --fidelity, riddle2025-muscles and riddle2023-fast, beside riddle2023
-    --cases steps       physics steps of 1 to 40 ms
-    --cases segments    rods of 3 to 30 segments
-    --cases chain       the paper's formulation, 3 to 12 segments
-    --cases duration    10 and 60 s, for the memory
+    --cases levels    levels of --fidelity, and three presets
+    --cases steps     physics steps of 1 to 40 ms
+    --cases segments  rods of 3 to 30 segments
+    --cases chain     the paper's formulation, 3 to 12 segments
+    --cases duration  10 and 60 s, for the memory
 
-    The whole takes up to half an hour. Leave the machine alone meanwhile: what else runs is measured too.
-    Every measurement is kept in bench/cases, so a second call goes on where the first one was stopped, and
-    a full run takes over what --quick measured. Delete that folder to measure again.
+    It takes up to half an hour. Run nothing else meanwhile: other programs change the times. Every measurement is kept
+    in bench/cases, so a second call continues where the first was stopped, and a full run uses the results of --quick.
+    Delete that folder to measure again.
 
     \b
-    annelid study bench                                   everything, into the folder bench
-    annelid study bench --quick                           an overview
-    annelid study bench --cases levels -o levels          levels of fidelity and presets only
-    annelid study bench --cases segments --cases chain    how the cost grows with the worm
+    annelid study bench                           all, into the folder bench
+    annelid study bench --quick                   an overview
+    annelid study bench --cases levels -o levels  levels and presets only
+    annelid study bench --cases segments          cost against segments
     """
     from annelid.experiment import study_progress
     from annelid_studies.bench.benchmark import bench
@@ -132,10 +133,10 @@ def bench_command(
 @study("robustness")
 def robustness_command(
     output: ResultsFolder = Path("robustness"),
-    points: Annotated[int, typer.Option(min=1, max=1_000_000, help="How many points of the sample.")] = 300,
+    points: Annotated[int, typer.Option(min=1, max=1_000_000, help="Number of points of the sample.")] = 300,
     segments: Annotated[
         int | None,
-        typer.Option(min=3, max=200, help="Give every worm this many segments.  [default: as drawn, 3 to 24]"),
+        typer.Option(min=3, max=200, help="Number of segments of every worm  [default: drawn, 3 to 24]"),
     ] = None,
     controller: Annotated[
         list[str] | None, typer.Option(metavar="KIND", help="Only this one; may be repeated.  [default: all four]")
@@ -146,16 +147,18 @@ def robustness_command(
 ) -> None:
     """Compare how often controllers make different worms walk.
 
-    The designed sample varies sensor noise, friction, physics step, number of segments and stiffness. Every worm is
-    driven by four controllers: sns (the paper's, with the preset's tolerance), sns-tolerance (the paper's, with the
-    tolerance that its body needs), sns-robust, and timed (a wave without sensing). Writes robustness.json and
-    robustness.md, of all runs that the folder keeps: a second call goes on where the first was stopped, and one with
-    more points computes only these. All 300 points take about 25 hours of one core for each controller.
+    The sample varies sensor noise, friction, physics step, number of segments and stiffness. Every worm is driven by
+    four controllers. sns is the paper's, with the preset's tolerance. sns-tolerance is the same with the tolerance that
+    its body needs. sns-robust is this project's own. timed is a wave without sensing.
+
+    Writes robustness.json and robustness.md for all runs in the folder. A second call continues where the first was
+    stopped, and one with more points computes only the new ones. All 300 points take about 25 hours of one core for
+    each controller.
 
     \b
     annelid study robustness --points 10 -o draft     the first ten points
     annelid study robustness --segments 3             short worms only
-    annelid study robustness --controller sns-robust  only ours
+    annelid study robustness --controller sns-robust  one controller only
     annelid study robustness --points 300             all
     """
     from annelid_studies.robustness import CONTROLLERS, robustness, shares, shares_table
@@ -204,9 +207,7 @@ def challenge_command(
     ] = False,
     known: Annotated[
         list[Path] | None,
-        typer.Option(
-            "--with", metavar="RUNS.csv", help="Take the runs that another call has computed; may be repeated."
-        ),
+        typer.Option("--with", metavar="RUNS.csv", help="Use the runs of another call; may be repeated."),
     ] = None,
     output: Output = Path("challenge"),
     jobs: Jobs = None,

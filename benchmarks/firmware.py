@@ -45,7 +45,7 @@ WORMS: dict[str, dict[str, Any]] = {
     "peristalsis": {"controller": {"kind": "sns"}},
     "robust": {"controller": {"kind": "sns-robust"}},
     "pressure": {"controller": {"kind": "sns-pressure"}},
-    "adaptive": {"controller": {"kind": "adaptive", "drive": 0.5}},
+    "adaptive": {"controller": {"kind": "adaptive", "drive": 0.5}, "clock.physics_timestep_s": 0.005},
 }
 """What differs from riddle2023-rods."""
 SAME_STEPS = 10

@@ -266,16 +266,6 @@ def test_a_renamed_field_is_read_under_its_new_name(tmp_path: Path) -> None:
     assert variable.field == new
 
 
-def test_a_field_of_the_other_formulation_is_refused() -> None:
-    with pytest.raises(ConfigError, match="another kind"):
-        load_config("riddle2023-rods", parse_assignments(["body.formulation.armature_kg_m2=0.1"]))
-
-
-def test_planar_worms_have_no_ground() -> None:
-    with pytest.raises(ConfigError, match="arena has no effect"):
-        load_config("riddle2022-planar", parse_assignments(["arena.friction=0.1"]))
-
-
 @pytest.mark.parametrize("heights", ["body.height_min_m=0.12", "body.height_max_m=0.15"])
 def test_planar_heights_must_fit_the_rhombus(heights: str) -> None:
     with pytest.raises(ConfigError, match="height_min_m < height_max_m < 2 side_m"):

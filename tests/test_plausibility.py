@@ -44,7 +44,7 @@ DOUBTFUL: list[tuple[str, Changes, str]] = [
     ("riddle2023-rods", {"body.mesh.n_helices": 6, "body.mesh.elements_per_side": 1}, "body.mesh.elements_per_side"),
     ("riddle2023-rods", {"body.springs.rest_length_m": 0.2}, "body.springs.rest_length_m"),
     ("riddle2023-rods", {"body.strands.young_modulus_Pa": 1e12}, "body.strands.young_modulus_Pa"),
-    ("riddle2023-rods", {"body.strands.young_modulus_Pa": 4.7e9}, "body.strands.shear_modulus_Pa"),
+    ("riddle2023-fast", {"body.strands.young_modulus_Pa": 1e9}, "body.strands.shear_modulus_Pa"),
     ("riddle2023-rods", {"body.strands.linear_density_kg_per_m": 5.0}, "body.strands.linear_density_kg_per_m"),
     ("riddle2023-rods", {"clock.physics_timestep_s": 0.1}, "clock.physics_timestep_s"),
     ("riddle2023-rods", {"arena.contact_time_constant_s": 0.002}, "arena.contact_time_constant_s"),
@@ -153,12 +153,6 @@ def window_of(config: RunConfig) -> tuple[float, float]:
     found = tolerance_window_m(config)
     assert found is not None
     return found
-
-
-def test_the_presets_own_tolerance_lies_in_its_window() -> None:
-    config = load_config("riddle2023-rods")
-    low_m, high_m = window_of(config)
-    assert low_m < config.sensor.tolerance_m < high_m
 
 
 def test_the_window_of_tolerances_follows_what_was_measured(subtests: pytest.Subtests) -> None:

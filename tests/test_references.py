@@ -29,11 +29,12 @@ CONTROLLERS = {
     "sns": {"riddle2022", "szczecinski2017"},
     "adaptive": {"riddle2022", "szczecinski2017", "nourse"},
     "sns-robust": {"riddle2022", "szczecinski2017"},
-    "sns-pressure": {"riddle2022", "szczecinski2017", "daltorio2013"},
     "sns-waiting": {"riddle2022", "szczecinski2017"},
+    "sns-pressure": {"riddle2022", "szczecinski2017", "daltorio2013"},
     "shc": {"horchler2015", "shaw2012", "stone1990", "daltorio2013"},
     "phase-chain": {"ijspeert2007"},
     "timed": {"riddle2025models"},
+    "network": {"riddle2022"},
     "sine": set(),
 }
 

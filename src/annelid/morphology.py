@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from math import asin, cos, floor, hypot, pi, radians, sin
+from math import asin, floor, hypot, pi, sin
 from typing import NamedTuple
 
 import numpy as np
@@ -31,14 +31,6 @@ _SAME_PLACE = 1e-9
 """Of the body's length: difference of two distances that are equal but for rounding."""
 _NEXT, _LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
 """For every axis in space, the two that its vector product is of."""
-
-
-def heading_turn(heading_deg: float) -> Array:
-    """Returns the rotation, ``(3, 3)``, by an angle to the left about the vertical, exact for quarter turns."""
-    quarter, rest = divmod(heading_deg, 90.0)
-    c, s = cos(radians(rest)), sin(radians(rest))
-    c, s = ((c, s), (-s, c), (-c, -s), (s, -c))[int(quarter) % 4]
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 @dataclass(frozen=True)

@@ -38,7 +38,7 @@ class Console(rich.console.Console):
 
 @contextmanager
 def progress_bar(*, forced: bool = False, transient: bool = False) -> Iterator[Callable[[str, float, str], None]]:
-    """Shows a progress bar on stderr as long as the block runs.
+    """Shows a progress bar, and the time that is left, on stderr as long as the block runs.
 
     Args:
         forced: Show it also where stderr is no terminal.
@@ -47,12 +47,13 @@ def progress_bar(*, forced: bool = False, transient: bool = False) -> Iterator[C
     Yields:
         What draws it: called with the text before the bar, the share that is done, and the text behind it.
     """
-    from rich.progress import BarColumn, Progress, TextColumn
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
     bar = Progress(
         TextColumn("{task.description}", markup=False),
         BarColumn(),
         TextColumn("{task.fields[behind]}", markup=False),
+        TimeRemainingColumn(compact=True),
         console=Console(stderr=True, force_terminal=True if forced else None),
         transient=transient,
         # The caller refreshes it; a thread of its own would compete with the physics for the core.

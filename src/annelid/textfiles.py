@@ -17,6 +17,7 @@ from annelid.text import printable
 
 __all__ = [
     "check_depth",
+    "line_of",
     "parse_toml",
     "parse_xml",
     "read_bytes",
@@ -167,8 +168,13 @@ def parse_xml(text: str | bytes, what: str, most_elements: int, most_levels: int
 
 def tag_of(element: ET.Element) -> str:
     """Returns how an error names an element that `parse_xml` has read: its tag, after its line where that is known."""
-    line = getattr(element, "line", 0)
+    line = line_of(element)
     return f"line {line}: <{element.tag}" if line else f"<{element.tag}"
+
+
+def line_of(element: ET.Element) -> int:
+    """Returns the line of an element that `parse_xml` has read, 0 where it is not known."""
+    return getattr(element, "line", 0)
 
 
 def check_depth(tree: Any, name: str) -> None:

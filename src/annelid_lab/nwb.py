@@ -59,7 +59,7 @@ def write_nwb(run: Run, path: Path, progress: Progress) -> list[Path]:
     behaviour: Any = BehavioralTimeSeries()
     position: Any = Position()
     neural: list[TimeSeries] = []
-    frame = "world axes x, y, z: z is up, and the worm heads towards -x unless body.heading_deg says otherwise"
+    frame = "world axes x, y, z: z is up, and the worm heads towards -x at the start"
     clock = _clock(run.data["time"].values)
     electrodes: dict[str, Any] = {}
     for done, (recorded, name) in enumerate(zip(names, numbered(map(_key, names)), strict=True)):

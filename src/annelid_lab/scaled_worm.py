@@ -39,6 +39,9 @@ def similar_worm(
     n_helices: int = 12,
     length_m: float | None = None,
     rear_radius_m: float | None = None,
+    segment_length_m: float | None = None,
+    strand_radius_m: float | None = None,
+    young_modulus_Pa: float | None = None,
 ) -> Fields:
     """Returns the fields in which a worm differs from `BASE`.
 
@@ -48,13 +51,25 @@ def similar_worm(
         n_helices: Strands, half of each handedness.
         length_m: Length at rest; by default that at which rhombi have the shape of the base's.
         rear_radius_m: Radius at rest of the last ring, where the body tapers; all else follows the first's.
+        segment_length_m: Distance of two rings at rest, in place of the length.
+        strand_radius_m: Radius of the strands, which are solid; by default in proportion to the side of a rhombus.
+        young_modulus_Pa: Young's modulus of the strands; by default likewise.
 
     Raises:
         ConfigError: A number is out of its range, or with this length strands would lie along the body or the rings.
     """
-    if length_m is not None:
-        require_finite(length_m=length_m)
-        require_positive(length_m=length_m)
+    asked = {
+        "length_m": length_m,
+        "segment_length_m": segment_length_m,
+        "strand_radius_m": strand_radius_m,
+        "young_modulus_Pa": young_modulus_Pa,
+    }
+    for name, value in asked.items():
+        if value is not None:
+            require_finite(**{name: value})
+            require_positive(**{name: value})
+    if length_m is not None and segment_length_m is not None:
+        raise ConfigError("length_m and segment_length_m say the same: give one of them")
     base = load_config(BASE)
     known, arena = worm_of(base), base.arena
     assert arena is not None
@@ -63,7 +78,7 @@ def similar_worm(
     check_section(Mesh, known.mesh.model_dump() | geometry)
     scale = radius_m / known.mesh.one_number("radius_m")
     slower = sqrt(scale)
-    planes, rate = _planes_and_rate(known, radius_m, n_segments, n_helices, length_m)
+    planes, rate = _planes_and_rate(known, radius_m, n_segments, n_helices, length_m, segment_length_m)
     turn = pi / (n_helices // 2)
     sides = n_helices * (planes * (n_segments + 1))
     elements = max(ceil(turn / LARGEST_ANGLE_RAD - 1e-9), min(known.mesh.elements_per_side, MOST_ELEMENTS // sides))
@@ -74,11 +89,16 @@ def similar_worm(
     strands, pins, springs, rings = known.strands, known.pins, known.springs, known.rings
     ranges = [length * own.ring_length_m / shape.ring_length_m for length in rings.length_ranges(1)[0]]
     impedance = [*arena.contact_impedance[:2], arena.contact_impedance[2] * scale]
-    young_Pa, shear_Pa = (
-        strands.one_number("young_modulus_Pa") * longer,
-        strands.one_number("shear_modulus_Pa") * longer,
+    side = "in proportion to the side of a rhombus"
+    strand, strand_rule = (
+        (strands.radius_m * longer, side) if strand_radius_m is None else (strand_radius_m, "as asked")
     )
-    of_length = "the length asked for" if length_m else "rhombi of the base's shape"
+    thicker, base_Pa = strand / strands.radius_m, strands.one_number("young_modulus_Pa")
+    young_Pa, young_rule = (
+        (young_modulus_Pa, "as asked") if young_modulus_Pa else (base_Pa * longer, f"{side}, as the weight needs")
+    )
+    stiffer = young_Pa / base_Pa
+    of_length = "the length asked for" if length_m or segment_length_m else "rhombi of the base's shape"
     fields: Fields = {f"body.mesh.{name}": (value, "as asked") for name, value in geometry.items()} | {
         "body.mesh.angular_rate_rad_per_m": (rate, of_length),
         "body.mesh.elements_per_side": (
@@ -88,18 +108,21 @@ def similar_worm(
         "body.mesh.planes_between_rings": (planes, "rhombi close to the base's shape"),
         "body.mesh.free_planes_at_ends": (planes - 1, "one less than between rings"),
         "body.mesh.rear_overhang_m": (turn / rate / 2.0, "half the distance of two planes"),
-        "body.strands.radius_m": (strands.radius_m * longer, "in proportion to the side of a rhombus"),
-        "body.strands.young_modulus_Pa": (young_Pa, "side of a rhombus: as stiff for its weight as the base"),
-        "body.strands.shear_modulus_Pa": (shear_Pa, "the base's ratio to Young's modulus"),
+        "body.strands.radius_m": (strand, strand_rule),
+        "body.strands.young_modulus_Pa": (young_Pa, young_rule),
+        "body.strands.shear_modulus_Pa": (
+            strands.one_number("shear_modulus_Pa") * stiffer,
+            "the base's ratio to Young's modulus",
+        ),
         "body.strands.linear_density_kg_per_m": (
-            strands.one_number("linear_density_kg_per_m") * longer**2,
+            strands.one_number("linear_density_kg_per_m") * thicker**2,
             "the base's density",
         ),
         "body.strands.damping_time_s": (strands.damping_time_s * slower, "a time: radius^0.5"),
-        "body.pins.mass_kg": (pins.one_number("mass_kg") * longer**3, "the base's share of the weight"),
+        "body.pins.mass_kg": (pins.one_number("mass_kg") * thicker**2 * longer, "the base's share of the weight"),
         "body.pins.radius_m": (pins.radius_m * scale, "a length"),
         "body.springs.stiffness_N_per_m": (
-            springs.one_number("stiffness_N_per_m") * longer**2,
+            springs.one_number("stiffness_N_per_m") * stiffer * thicker**4 / longer**3,
             "strands' bending stiffness over side^3",
         ),
         "body.rings.length_range_m": (ranges, "the base's share of the ring at rest"),
@@ -119,7 +142,7 @@ def similar_worm(
         "arena.contact_impedance": (impedance, "the last is a length"),
         "arena.floor_gap_m": (arena.model_dump()["floor_gap_m"] * scale, "a length"),
     }
-    weight = longer**3 * n_helices / known.mesh.n_helices * n_segments / known.mesh.n_segments
+    weight = thicker**2 * longer * n_helices / known.mesh.n_helices * n_segments / known.mesh.n_segments
     network, steps = base.controller.model_dump(), _steps(base, n_segments, slower)
     fields |= steps | {
         "controller.capacitance_nF": (network["capacitance_nF"] * slower, "a time constant: radius^0.5"),
@@ -166,13 +189,25 @@ def worm_text(
     n_helices: int = 12,
     length_m: float | None = None,
     rear_radius_m: float | None = None,
+    segment_length_m: float | None = None,
+    strand_radius_m: float | None = None,
+    young_modulus_Pa: float | None = None,
 ) -> str:
     """Returns `similar_worm` as TOML that ``annelid run`` takes, with the rule behind every number.
 
     Raises:
         ConfigError: As `similar_worm`, or its run would be refused, by the checks or by the engine.
     """
-    fields = similar_worm(radius_m, n_segments, n_helices, length_m, rear_radius_m)
+    fields = similar_worm(
+        radius_m,
+        n_segments,
+        n_helices,
+        length_m,
+        rear_radius_m,
+        segment_length_m,
+        strand_radius_m,
+        young_modulus_Pa,
+    )
     config = load_config(BASE, _values(fields))
     refuse_nonsense(config)
     compile_spec(build_spec(config))
@@ -207,22 +242,30 @@ def _steps(base: RunConfig, n_segments: int, slower: float) -> Fields:
 
 
 def _planes_and_rate(
-    known: WormBody, radius_m: float, n_segments: int, n_helices: int, length_m: float | None
+    known: WormBody,
+    radius_m: float,
+    n_segments: int,
+    n_helices: int,
+    length_m: float | None,
+    segment_length_m: float | None,
 ) -> tuple[int, float]:
-    """Planes between rings, and turn of a strand along the axis, rad/m, that give a length."""
+    """Planes between rings, and turn of a strand along the axis, rad/m, that give a length of the worm or a segment."""
     mesh = known.mesh
     shape, half = mesh.angular_rate_rad_per_m * mesh.one_number("radius_m"), n_helices // 2
-    if length_m is None:
+    wanted_m = length_m or segment_length_m
+    if wanted_m is None:
         return mesh.planes_between_rings, shape / radius_m
 
     def rate(planes: int) -> float:
-        return pi / half * (2 * (planes - 1) + (n_segments - 1) * planes + 1) / length_m
+        spaces = planes if segment_length_m else 2 * (planes - 1) + (n_segments - 1) * planes + 1
+        return pi / half * spaces / wanted_m
 
     planes = min((4, 6, 8), key=lambda one: abs(log(rate(one) * radius_m / shape)))
     if not LEAST_SHAPE <= (turn := rate(planes) * radius_m) <= MOST_SHAPE:
-        most, least = (length_m * turn / bound for bound in (LEAST_SHAPE, MOST_SHAPE))
+        most, least = (wanted_m * turn / bound for bound in (LEAST_SHAPE, MOST_SHAPE))
+        name = "length_m" if length_m else "segment_length_m"
         raise ConfigError(
-            f"length_m = {length_m:g} does not fit {n_segments} segments of radius {radius_m:g} m: "
+            f"{name} = {wanted_m:g} does not fit {n_segments} segments of radius {radius_m:g} m: "
             f"with {planes} planes between rings it must be between {least:.2g} and {most:.2g} m"
         )
     return planes, rate(planes)

@@ -71,14 +71,14 @@ class Faults(TrialKind):
     def between(self, controller: Controller, config: RunConfig, plant: Plant) -> Controller:
         """Returns a controller under these faults, as `TrialKind.between`."""
         kind = SavedFaultyController if isinstance(controller, Stateful) else FaultyController
-        state = FaultState(self, plant, getattr(config.body, "heading_deg", 0.0))
+        state = FaultState(self, plant)
         return kind(controller, state)
 
 
 class FaultState(SavedAndRecorded):
     """The faults of one worm's sensors and muscles, and what they depend on."""
 
-    def __init__(self, trial: Faults, plant: Plant, heading_deg: float) -> None:
+    def __init__(self, trial: Faults, plant: Plant) -> None:
         """Begins as `reset`."""
         self.trial, self._plant = trial, plant
         per_segment = plant.n_muscles // plant.n_segments
@@ -93,7 +93,7 @@ class FaultState(SavedAndRecorded):
         self._pull_N = np.zeros(0)
         if isinstance(plant, WormPlant):
             weight_N = plant.model.body_mass.sum() * np.linalg.norm(plant.model.opt.gravity)
-            self._pull_N = _backwards(plant, heading_deg, trial.pull * float(weight_N))
+            self._pull_N = _backwards(plant, trial.pull * float(weight_N))
         self._n_values = sum(getattr(sensed, name).size for name in SENSORS)
         self.reset(0)
 
@@ -134,11 +134,11 @@ class FaultState(SavedAndRecorded):
         return values
 
 
-def _backwards(plant: WormPlant, heading_deg: float, force_N: float) -> Array:
+def _backwards(plant: WormPlant, force_N: float) -> Array:
     """A force on the ring of the last segment against the worm's heading, ``(n_crossings, 3)``."""
-    ring, angle = plant.geometry.rings[-1], np.radians(heading_deg)
+    ring = plant.geometry.rings[-1]
     force = np.zeros((plant.geometry.n_crossings, 3))
-    force[ring] = force_N / len(ring) * np.array([np.cos(angle), np.sin(angle), 0.0])
+    force[ring, 0] = force_N / len(ring)
     return force
 
 

@@ -119,7 +119,9 @@ def points(quick: bool = False) -> list[Point]:
     flat = [Point("flat", gait, mu, nan, False) for gait in FLAT_GAITS for mu in FRICTIONS[gait]]
     bends = [Point("bend", gait, PIPE_FRICTION, radius, False) for gait in PIPE_GAITS for radius in RADII_M[gait]]
     straight = [Point("straight pipe", gait, PIPE_FRICTION, nan, False) for gait in ("3x1", "3x1, as in 2026")]
-    return [*flat, *straight, *bends, Point("flat", "3x1", 0.3, nan, True)]
+    half = [Point("flat", "3x1", 0.3, nan, True), Point("straight pipe", "3x1", PIPE_FRICTION, nan, True)]
+    half += [Point("bend", "3x1", PIPE_FRICTION, radius, True) for radius in (0.5, 0.7)]
+    return [*flat, *straight, *bends, *half]
 
 
 def cases(point: Point) -> list[Case]:

@@ -38,16 +38,18 @@ PLAIN, EXTENSION, PRESSURE, TIMED = "paper's network", "feedback, no pressure", 
 
 
 def _feedback(hold: float) -> dict[str, Any]:
-    network = {"kind": "sns", "gate_start": "toolbox", "gate_time_constant_ms": 318.0}
-    strengths = {"hold": hold, "release": 5.93, "exchange": 0.204}
-    return {"controller": {"kind": "sns-pressure", "network": network, **strengths}, "sensor.tolerance_m": 0.00203}
+    network = {"kind": "sns", "gate_start": "toolbox", "gate_time_constant_ms": 344.0}
+    strengths = {"hold": hold, "release": 5.318, "exchange": 0.05207}
+    return {"controller": {"kind": "sns-pressure", "network": network, **strengths}, "sensor.tolerance_m": 0.003332}
 
 
 CONTROLLERS: Mapping[str, Mapping[str, Any]] = {
     PLAIN: {},
     EXTENSION: _feedback(0.0),
-    PRESSURE: _feedback(0.877),
-    TIMED: {"controller": {"kind": "timed", "rise_s": 0.0365, "hold_s": 0.328, "fall_s": 0.058, "interval_s": 0.1206}},
+    PRESSURE: _feedback(1.02),
+    TIMED: {
+        "controller": {"kind": "timed", "rise_s": 0.04079, "hold_s": 0.2104, "fall_s": 0.1913, "interval_s": 0.1137}
+    },
 }
 """What drives the worm: the preset's controller, feedback with and without what needs touch, and the baseline."""
 

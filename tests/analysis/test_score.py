@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from annelid.analysis import RhythmScore, lengthening_score, rhythm_score
 from annelid.analysis.rhythm import contractions, rhythm, score
 from annelid.config import load_config
-from annelid.simulation import Run, simulate
+from annelid.simulation import Run
 from synthetic import wave_activation, wave_data
 
 INTERVAL_S = 0.005
@@ -269,24 +269,6 @@ def test_what_comes_before_can_be_left_out() -> None:
         rhythm_score(run_of(data.drop_vars("activation")))
     with pytest.raises(ValueError, match="holds no stretch_length"):
         lengthening_score(run_of(data.drop_vars("stretch_length")))
-
-
-def test_sensors_that_never_switch_off_silence_the_worm(tmp_path: Path) -> None:
-    """At a tolerance of 8 cm segment 1 is felt at rest while it contracts, so it lets go and none takes over."""
-    step_s = 0.02
-    steps = {"clock.physics_timestep_s": step_s, "record.signals_interval_s": step_s}
-    config = load_config("riddle2023-rods", {**steps, "sensor.tolerance_m": 0.08, "duration_s": 3.0})
-    run = simulate(config, tmp_path, progress=False)
-    found = rhythm_score(run)
-    assert (found.verdict, found.order) == ("silent", (1,))
-    # Its muscles contract from the start, long before the hold of its sensor ends.
-    assert found.last_onset_s is not None
-    assert found.last_onset_s < config.sensor.startup_hold_s / 2
-    on = run.data["sensor_on"].sel(time=slice(config.sensor.startup_hold_s + step_s, None))
-    assert on.values.all()
-    longer_m = (run.data["stretch_length"] - run.data["stretch_rest_length"]).mean("sensor")
-    usual_m = load_config("riddle2023-rods").sensor.tolerance_m
-    assert usual_m < float(longer_m.sel(segment=1).max()) < 0.08, "it contracts, and is felt at rest"
 
 
 def lengthened(peaks_m: list[float]) -> RhythmScore:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from math import expm1
 from types import SimpleNamespace
 from typing import Any
 
@@ -143,39 +142,6 @@ def test_against_a_stiff_ring_a_servo_stalls_at_its_force_limit() -> None:
     for step in range(1, round(0.2 / timestep_s) + 1):
         felt = plant.step(np.zeros(plant.n_muscles))
         assert felt.muscle_force_N == pytest.approx(LIMIT_N - rate * step * timestep_s, abs=0.06 * LIMIT_N)
-
-
-MOTOR_M = 1.19
-MOTOR = {"body.rings.no_load_speed_m_per_s": 0.04, "body.rings.cable_friction": MOTOR_M}
-FELT = -expm1(-MOTOR_M) / MOTOR_M
-"""Mean tension round a cable over that at its motor (Euler and Eytelwein)."""
-
-
-def test_a_motor_at_a_fixed_length_pulls_as_its_line_says_and_takes_what_its_heat_is() -> None:
-    """With v = v0 (1 - T / T0), tension goes to T0 as exp(-k v0 t / T0); stalled, a motor takes F0 v0."""
-    changes = STIFF | {"body.rings.length_range_m": [0.62, 0.959], "body.springs.stiffness_N_per_m": 0.0}
-    plant = worm(**changes, **MOTOR, **{f"clock.{name}_timestep_s": 0.0025 for name in ("control", "physics")})
-    most_N, times = FELT * LIMIT_N, 0.0025 * np.arange(1, 601)
-    # Cables are a little shorter than the rings at rest.
-    first_N = STIFFNESS_N_PER_M * float((plant.observe().ring_length_m - plant.act).mean())
-    tension, taken = [], []
-    for _ in times:
-        tension.append(plant.step(np.ones(plant.n_muscles)).muscle_force_N.mean())
-        taken.append(plant.energies.motor_energy.mean())
-    expected = most_N - (most_N - first_N) * np.exp(-STIFFNESS_N_PER_M * 0.04 / most_N * times)
-    assert np.abs(tension - expected).max() < 0.06 * most_N
-    assert tension[-1] == pytest.approx(most_N, rel=0.01)
-    assert (taken[-1] - taken[-101]) / (100 * 0.0025) == pytest.approx(LIMIT_N * 0.04, rel=0.02)
-
-
-@given(load=st.floats(0.0, 1.0))
-def test_a_motor_winds_the_slower_the_more_it_pulls_and_lets_go_at_the_limit(load: float) -> None:
-    rings = ServoRings(
-        stiffness_N_per_m=STIFFNESS_N_PER_M, speed_limit_m_per_s=SPEED_M_PER_S, no_load_speed_m_per_s=0.04
-    )
-    length = 0.4 + load * LIMIT_N / STIFFNESS_N_PER_M
-    assert speed(1.0, 0.4, length, rings) == pytest.approx(-0.04 * (1.0 - load), abs=1e-9)
-    assert speed(0.0, 0.4, length, rings) == pytest.approx(SPEED_M_PER_S, abs=1e-9)
 
 
 def test_servos_may_differ_from_segment_to_segment() -> None:

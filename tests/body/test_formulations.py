@@ -141,16 +141,6 @@ def test_forces_at_crossings_bend_a_strand_as_they_bend_a_beam(subtests: pytest.
                 assert np.abs(sag_m(forces, elements, np.ones_like(weights)) - wanted).max() > 1e-3
 
 
-def test_weights_integrate_products_of_linear_moments_and_leave_free_ends_alone() -> None:
-    for elements in (2, 3, 5):
-        geometry = mesh(elements)
-        weights, (first, last) = curvature_weights(geometry), geometry.crossing_vertex[[0, -1]]
-        assert (1.0 / weights[first : first + elements]).sum() == pytest.approx(elements)
-        assert weights[:first] == pytest.approx(1.0)
-        assert weights[last - 1 :] == pytest.approx(1.0)
-    assert curvature_weights(mesh(1)) == pytest.approx(1.0)
-
-
 def test_what_a_written_worm_lacks_is_said() -> None:
     with pytest.warns(UserWarning, match="a rod in MJCF is equally stiff at every vertex"):
         mjcf_text(worm(RODS))

@@ -33,7 +33,6 @@ FIELDS = (
     "body.pins.mass_kg",
     "body.springs.stiffness_N_per_m",
     "body.springs.rest_length_m",
-    "body.relative_friction",
 )
 EVEN = {"body.mesh.rear_overhang_m": None, "body.mesh.elements_per_end": 1, "body.mesh.elements_per_side": 2}
 """A mesh whose rear is the image of its front."""
@@ -78,7 +77,6 @@ def test_equal_numbers_make_the_model_of_the_one_number_bit_for_bit(preset: str)
     one = load_config(preset)
     n = one.body.n_segments
     lists = {path: [value] * n for path in FIELDS if (value := field_value(one, path)) is not None}
-    lists["body.relative_friction"] = [1.0] * n
     first, second = compiled(one), compiled(load_config(preset, lists))
     for name in dir(first):
         if isinstance(array := getattr(first, name), np.ndarray):
@@ -104,7 +102,7 @@ def test_rings_of_a_tapering_worm_are_polygons_of_its_radius_there() -> None:
 )
 def test_a_tapering_worm_starts_on_its_belly(preset: str, radii_m: list[float]) -> None:
     ranges = [[0.59 * 6.0 * radius, 1.11 * 6.0 * radius] for radius in radii_m]
-    changes = {"body.mesh.radius_m": radii_m, "body.rings.length_range_m": ranges, "body.heading_deg": 30.0}
+    changes = {"body.mesh.radius_m": radii_m, "body.rings.length_range_m": ranges}
     plant = WormPlant(load_config(preset, changes))
     rings = plant.posture.crossing[plant.geometry.rings]
     lowest = rings[..., 2].min(axis=1)
@@ -146,39 +144,6 @@ def test_springs_pull_by_the_rate_and_the_length_of_their_segment() -> None:
     along = 4 * pi / 12 / 14.0
     expected = [rate * (along - rest) for rate, rest in of_bay]
     assert pull.reshape(7, 6) == pytest.approx(np.repeat(expected, 6).reshape(7, 6), rel=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("preset", "arena"),
-    [
-        (RODS, {}),
-        ("riddle2023", {}),
-        (RODS, {"arena.backward_friction": 2.0}),
-        ("riddle2023", {"arena.kind": "rough", "arena.roughness_m": 1e-4}),
-    ],
-)
-def test_every_contact_rubs_as_its_segment_does(preset: str, arena: dict[str, Any]) -> None:
-    shares = [0.5, 1.0, 2.0]
-    changes = {"body.relative_friction": shares, "arena.friction": 0.4, "arena.floor_gap_m": 0.0, **arena}
-    plant = WormPlant(load_config(preset, changes))
-    for _ in range(round(0.1 / plant._config.clock.control_timestep_s)):
-        plant.step(np.zeros(3))
-    data, geometry = plant.data, plant.geometry
-    mujoco.mj_forward(plant.model, data)
-    assert data.ncon > 6
-    seen = set[int]()
-    # Skin that slides to the rear is held by setae.
-    setae = {"arena.backward_friction": 2.0}.items() & arena.items()
-    for contact in data.contact[: data.ncon]:
-        (skin,) = (geom for geom in contact.geom if plant.model.geom_type[geom] != mujoco.mjtGeom.mjGEOM_PLANE)
-        away = np.abs(data.geom_xpos[skin, 0] - geometry.plane_x_m[geometry.ring_planes])
-        segment = int(away.argmin())
-        # Near the ends of a segment a part may be its neighbour's.
-        if away[segment] < 0.05:
-            seen.add(segment)
-            levels = [0.4, 2.0] if setae else [0.4]
-            assert any(contact.friction[0] == pytest.approx(level * shares[segment]) for level in levels)
-    assert seen == {0, 1, 2}
 
 
 @pytest.fixture(scope="module")

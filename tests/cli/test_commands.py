@@ -194,7 +194,7 @@ def test_every_option_with_a_unit_says_it() -> None:
 
     numbers = [each for each in options(get_command(app)) if "float" in str(each.type_descriptor.annotation)]
     assert numbers
-    unit = re.compile(r"(?<!')\b(s|ms|mV|mm|m|N|rad|share|per second|seconds)\b", re.IGNORECASE)
+    unit = re.compile(r"(?<!')\b(s|ms|mV|mm|m|N|Pa|rad|share|per second|seconds)\b", re.IGNORECASE)
     for option in numbers:
         assert unit.search(option.help), option.opts
 
@@ -241,6 +241,10 @@ def test_arenas_are_listed_printed_built_and_walked_in(annelid: Command) -> None
 def test_the_command_prints_findings_and_refuses(annelid: Command) -> None:
     assert annelid("check").out.strip() == "nothing found"
     assert annelid("check", "riddle2022-planar").exit_code == 0
+    unstable = ("--set", "controller.kind=sns-robust", "--set", "clock.control_timestep_s=0.02")
+    assert "clock.control_timestep_s = 0.02 must be at most" in annelid("check", *unstable).err, "as run says"
+    same = annelid("check", "riddle2023-rods", "--set", "arena.friction=0.5", "--set", "body.mesh.radius=0.16")
+    assert same.err == "annelid: note: body.mesh.radius_m = 0.16 changes nothing: riddle2023-rods has this value\n"
     thin = annelid("check", "wang", "--set", "body.mesh.radius=0.05")
     assert thin.exit_code == 2
     assert thin.out.startswith("error: body.rings.length_range_m = [0.45, 0.96]: a ring is 0.3 m long at rest")
@@ -250,6 +254,11 @@ def test_the_command_prints_findings_and_refuses(annelid: Command) -> None:
     assert refused.exit_code == 2
     assert "set [0.195, 0.3]" in refused.sentence()
     assert not Path("thin").exists()
+
+
+def test_a_folder_of_runs_is_said_to_be_one(annelid: Command, finished: Path) -> None:
+    said = annelid("show", str(finished.parent)).sentence()
+    assert f"{finished.parent} holds 1 run: name one of them, as {finished}" in said
 
 
 def test_a_run_comes_before_a_preset_of_its_name(annelid: Command, finished: Path) -> None:

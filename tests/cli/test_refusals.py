@@ -34,6 +34,7 @@ from outcome import Command
         ),
         (("show", "nothere"), "there is no run file nothere"),
         (("list", "presets", "ridle2023"), "did you mean 'riddle2023'"),
+        (("run", "--duration", "1e300"), "duration_s = 1e+300: must be at most"),
     ],
 )
 def test_bad_input_ends_in_one_sentence_and_leaves_nothing(

@@ -24,8 +24,6 @@ def refusal(*words: str) -> str:
 
 
 def test_what_cannot_be_viewed_or_served_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "robot.toml").write_text('[body]\nkind = "mjcf"\n')
-    assert "cannot be viewed" in refusal(str(tmp_path / "robot.toml"))
     assert "did you mean 'riddle2023'" in refusal("ridle2023")
     assert "there is no such address" in refusal("--no-open", "--host", "no.such.host.invalid")
     assert "played as it was" in refusal(str(tmp_path), "--segments", "4")

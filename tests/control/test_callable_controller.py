@@ -28,15 +28,7 @@ def test_the_callers_array_is_not_shared():
     assert mine.tolist() == [0.0] * 3
 
 
-def test_anything_else_is_refused_in_one_sentence(subtests: pytest.Subtests) -> None:
-    for result, message in (
-        ([0.1, 0.2], r"shape \(2,\) at 0.25 s; it must return shape \(3,\)"),
-        ([0.1, 1.2, 0.3], "activation 1.2 for muscle 2"),
-        ([0.1, 0.2, -0.3], "activation -0.3 for muscle 3"),
-        ([0.1, float("nan"), 0.3], "activation nan for muscle 2"),
-        (None, "activation nan for muscle 1"),
-        ("half", "returned str"),
-        ([[0.1], [0.2, 0.3]], "returned list"),
-    ):
+def test_what_is_no_number_is_refused_in_one_sentence(subtests: pytest.Subtests) -> None:
+    for result, message in (("half", "returned str"), ([[0.1], [0.2, 0.3]], "returned list")):
         with subtests.test(f"{result!r:.60}"), pytest.raises(ConfigError, match=message):
             CallableController(lambda s, result=result: result, n_muscles=3).step(FELT)  # type: ignore[arg-type]

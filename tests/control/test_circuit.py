@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from annelid.control import Circuit, CircuitController, Pulse, Readout, Sense, Switch, lengthening_m
 from annelid.errors import ConfigError
 from annelid.nervous import Network, Neuron, neuron_names
-from annelid.protocols import SIDES, Array, StridingController
+from annelid.protocols import SIDES, Array
 
 OFF = 0.02
 SLOPE_PER_MV, RANGE_MV = 0.1, 15.0
@@ -191,7 +191,6 @@ KINDS: dict[str, dict[str, Any]] = {
     "sns": {},
     "adaptive": {"drive": 0.3},
     "sns-pressure": {},
-    "sns-waiting": {},
     "sns-robust": {"motor_time_constant_s": 0.2, "descending": {"lift": 0.45}},
 }
 HELD = {"startup_hold_s": 0.013, "hysteresis_m": 0.004}
@@ -214,31 +213,6 @@ def test_a_stride_is_its_steps_also_where_lengths_go_on_at_their_rates(kind: str
     assert {signal.name: signal.shape for signal in stepped.recordable().signals} == {
         name: np.shape(value) for name, value in stepped.read(frame=False).items()
     }
-
-
-@settings(max_examples=30)
-@given(
-    chunks=st.lists(st.integers(1, 30), min_size=1, max_size=8),
-    hold_s=st.floats(0.0, 0.08),
-    tolerance_m=st.floats(0.0, 0.02),
-    hysteresis_m=st.floats(0.0, 0.01),
-    timestep_s=st.sampled_from([0.001, 0.0005, 0.0007]),
-    scheme=st.sampled_from(["euler", "toolbox", "heun"]),
-    seed=st.integers(0, 999),
-)
-def test_a_stride_has_the_bits_of_so_many_steps(chunks, hold_s, tolerance_m, hysteresis_m, timestep_s, scheme, seed):
-    section = {"tolerance_m": tolerance_m, "hysteresis_m": hysteresis_m, "startup_hold_s": hold_s}
-    one = controller(timestep_s=timestep_s, sensor=section, scheme=scheme, kick_nA=2.0)
-    other = CircuitController(one.circuit, 3, timestep_s)
-    assert isinstance(one, StridingController)
-    rng, taken = np.random.default_rng(seed), 0
-    for n_steps in chunks:
-        sensation = felt(rng.uniform(-0.01, 0.03, 3), taken * timestep_s, rate_m_per_s=rng.uniform(-0.5, 0.5, (3, 1)))
-        stepped = [other.step(sensation.later(step * timestep_s)) for step in range(taken, taken + n_steps)]
-        np.testing.assert_array_equal(one.stride(sensation, n_steps), stepped)
-        for a, b in zip(one.get_state().values(), other.get_state().values(), strict=True):
-            np.testing.assert_array_equal(a, b)
-        taken += n_steps
 
 
 @settings(max_examples=30)

@@ -11,8 +11,7 @@ import pytest
 import annelid
 from annelid.control import NetworkController, Sense
 from annelid.errors import ConfigError
-from annelid.nervous import GapJunction, Network, Neuron, Synapse
-from annelid.nervous import persistent_sodium as sodium
+from annelid.nervous import Network, Neuron, Synapse
 
 N = 6
 NAMES = [f"segment{number}" for number in range(1, N + 1)]
@@ -58,33 +57,6 @@ def test_it_is_the_network_stepped_by_hand() -> None:
     assert ours.read(False)["potential"] == pytest.approx(state.potential[0], abs=0.0)
 
 
-def test_currents_and_gates_are_recorded_by_name_and_add_up() -> None:
-    """The rate of each potential times its capacitance is the sum of leak, bias and the currents that are recorded."""
-    network = Network("all")
-    network.add_neuron("a", Neuron(8.0, bias_nA=14.0))
-    network.add_neuron("b", Neuron(9.0, 0.8, rest_mV=1.0), 3.0)
-    network.add_neuron("c", Neuron(7.0, channels=(sodium(0.4),)), 4.0)
-    network.add_synapse("a", "b", Synapse(0.5, 60.0))
-    network.add_synapse("b", "a", Synapse(0.4, -40.0))
-    network.add_synapse("b", "a", Synapse(0.2, 50.0, 1.0, 5.0))
-    network.add_gap_junction("a", "b", GapJunction(0.1, rectified=True))
-    network.add_synapse("b", "c", Synapse(0.3, 50.0))
-    network.add_output("b", "b")
-    driven = NetworkController(network, {}, ["b"])
-    names = driven.recordable().coords
-    assert names["connection"] == ["a -> b", "b -> a", "b -> a_2", "a -> b_2", "b -> c"]
-    assert names["channel"] == ["c"]
-    after = driven.read(False)
-    for step in range(200):
-        before = driven.read(False)
-        driven.step(sensed(np.zeros(1), step))
-        after = driven.read(False)
-        potential, current = np.asarray(before["potential"]), np.asarray(before["synaptic_current"])
-        expected = -0.8 * (potential[1] - 1.0) + current[0] + current[3]
-        assert 9.0 * (np.asarray(after["potential"])[1] - potential[1]) == pytest.approx(expected, abs=1e-9)
-    assert np.asarray(after["gate"]).shape == (1,)
-
-
 def test_outputs_and_control_step_must_fit() -> None:
     with pytest.raises(ConfigError, match="1 outputs expand and 2 contract"):
         NetworkController(baton(), {}, ["segment1", ("segment2", "segment3")])
@@ -104,7 +76,6 @@ def test_a_run_goes_on_bit_for_bit_and_its_network_can_be_drawn(tmp_path: Path) 
     first = annelid.simulate(half, tmp_path / "first", controller=controller())
     rest = annelid.simulate(config, tmp_path / "rest", resume=first, controller=controller())
     assert (whole.data["potential"].values[-1] == rest.data["potential"].values[-1]).all()
-    assert (whole.data["synaptic_current"].values[-1] == rest.data["synaptic_current"].values[-1]).all()
     assert list(whole.data["neuron"].values) == NAMES
     from annelid.draw.figures.network_diagram import run_network_figure
 

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from annelid.config import check_config, load_config
-from annelid.control import CircuitController, TimedController
+from annelid.control import CircuitController, OpenLoopController
 from annelid.control.open_loop import TimedWave
 from annelid.control.turning import (
     ConstantTurning,
@@ -67,8 +67,8 @@ def turned(section: TurningKind, pattern: Controller | None = None, n_segments: 
     return TurningController(pattern or wave(n_segments), section, n_segments, 2 * n_segments, STEP_S)
 
 
-def wave(n_segments: int = N) -> TimedController:
-    return TimedController(TimedWave(rise_s=0.1, hold_s=0.1, fall_s=0.1, interval_s=0.1), n_segments, 2 * n_segments)
+def wave(n_segments: int = N) -> OpenLoopController:
+    return OpenLoopController(TimedWave(rise_s=0.1, hold_s=0.1, fall_s=0.1, interval_s=0.1), n_segments, 2 * n_segments)
 
 
 def sns(n_segments: int = N) -> CircuitController:

@@ -100,6 +100,7 @@ ELSEWHERE = {
     ("annelid", "study", "gallery"): "tests/docs/test_gallery_list.py calls it",
     ("annelid", "export-network", "network.toml"): "tests/cli/test_commands.py exports such a file",
     ("annelid", "loop"): "it needs hardware; tests/lab/loop/test_hardware_loop.py calls it",
+    ("annelid", "study", "paper"): "the command `annelid paper`",
     ("annelid", "view"): "it opens a browser; the command has tests of its own",
     ("annelid", "run", "my_robot.xml"): "a robot of the reader's own; tests/lab/test_own_robot.py runs some",
     ("annelid", "run", "robot.xml"): "the same",
@@ -116,7 +117,7 @@ FAST = ("README.md", "docs/how_to/read_a_run.md")
 
 SCRIPTS_ELSEWHERE = {
     "docs/tutorials/": "tests/docs/test_site.py runs the tutorials",
-    "docs/upstream/": "whole reproductions of what the engine does, half a minute each",
+    "docs/sweeps.md": "executors of batch systems and of MPI, which are not installed with the tests",
 }
 """Pages whose Python is not executed here, and why."""
 
@@ -139,7 +140,7 @@ BENCHMARKS_NEED = {
 }
 """What is not installed with the tests."""
 
-READERS_FILES = {"mine.toml": 'extends = "riddle2023-rods"\n'}
+READERS_FILES = {"mine.toml": 'extends = "riddle2023-rods"\n', "mine.csv": "mm,N\n0,0\n1,1\n"}
 """Files of the reader's own that a page takes for granted."""
 
 done: set[Command] = set()

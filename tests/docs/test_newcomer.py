@@ -89,15 +89,41 @@ TASKS = {
         prints="lag -10.3",
         own=own_log,
     ),
-    "own robot": Task(
-        "docs/how_to/change_the_worm.md",
+    "own size": Task(
+        "docs/how_to/own_size.md",
         (
             "annelid new small.toml --radius 0.05 --segments 5 --helices 8 --length 0.4",
-            "annelid run small.toml -o small",
             "annelid check small.toml",
+            "annelid run small.toml -o small",
         ),
         gives=("small.toml", "small/run.nc", "small/figure7.png"),
         prints="nothing found",
+    ),
+    "ring force": Task(
+        "docs/how_to/ring_force.md", ("annelid study load-frame --diameter-share 0.5 -o frame",), prints="2.29"
+    ),
+    "five segments and a speed": Task(
+        "docs/how_to/speed.md",
+        ("annelid run riddle2023-rods --segments 5 --duration 20 -o five", "annelid show five"),
+        prints="body lengths/s",
+    ),
+    "one synapse and its potentials": Task(
+        "docs/how_to/change_a_synapse.md",
+        (
+            "annelid run riddle2023-rods -o before",
+            "annelid export-network riddle2023-rods --to toml -o network.toml",
+            "annelid run riddle2023-rods --network network.toml -o after",
+            "annelid compare before after --potentials -o both",
+        ),
+        gives=("both/potentials.png",),
+    ),
+    "sloped pipe": Task(
+        "docs/tutorials/pipes.md",
+        (
+            "annelid run crawler --arena pipe --set arena.slope=10 --duration 6 -o uphill",
+            "annelid draw uphill --time 3 --camera side -o uphill/side.png",
+        ),
+        gives=("uphill/side.png",),
     ),
 }
 FAST = ("Gymnasium",)

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import inspect
 import re
-from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from annelid.environments import WormEnv
-from annelid.environments.task import Weights
+from annelid.environments.task import WEIGHTS
 
 PAGE = (Path(__file__).parents[2] / "docs" / "environments.md").read_text(encoding="utf-8")
 
@@ -27,7 +26,7 @@ def test_the_table_is_that_of_the_space(env: WormEnv) -> None:
 
 
 def test_every_weight_and_all_that_info_says_is_there(env: WormEnv) -> None:
-    for name, value in asdict(Weights()).items():
+    for name, value in WEIGHTS.items():
         assert re.search(rf"\| `reward_{name}` \|.*\| {value:g} \|", PAGE), name
     env.reset(seed=0)
     for name in env.step(np.zeros(6))[4]:

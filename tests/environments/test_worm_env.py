@@ -16,7 +16,7 @@ from worms import CHEAP, same
 
 from annelid.body.worm import WormBody
 from annelid.environments import ENVIRONMENTS, WormEnv
-from annelid.environments.task import Weights
+from annelid.environments.task import WEIGHTS
 from annelid.errors import AnnelidError, ConfigError, MissingDependency
 from annelid_studies.riddle2023.figures.renderings import rendering_works
 
@@ -141,7 +141,7 @@ def test_an_observation_taken_apart_and_laid_out_is_itself(env: WormEnv, seed: i
 
 
 def test_terms_of_the_reward_are_in_proportion_to_their_weights() -> None:
-    weights, usual = {"progress": 2, "effort": 3, "slip": 5, "failure": 7}, Weights()
+    weights, usual = {"progress": 2, "effort": 3, "slip": 5, "failure": 7}, WEIGHTS
     found = set()
     for changes in ({}, {"guard.edge_strain": 1e-4}):
         default, weighted = worm_env(changes), worm_env(changes, weights=weights)
@@ -150,7 +150,7 @@ def test_terms_of_the_reward_are_in_proportion_to_their_weights() -> None:
         before, after = (env.step(np.ones(3))[4] for env in (default, weighted))
         for name, weight in weights.items():
             term = before[f"reward_{name}"]
-            assert after[f"reward_{name}"] == pytest.approx(term * weight / getattr(usual, name), rel=1e-12, abs=0.0)
+            assert after[f"reward_{name}"] == pytest.approx(term * weight / usual[name], rel=1e-12, abs=0.0)
             found |= {name} if term else set()
     assert found == set(weights), "each term counted once at least"
 

@@ -46,19 +46,6 @@ def test_a_command_makes_the_run_of_its_case(
         assert_same_run(case)
 
 
-positive = st.floats(1e-3, 10.0)
-
-
-@settings(max_examples=30)
-@given(st.lists(st.tuples(st.integers(1, 3), st.floats(0.0, 5.0), positive, st.floats(0.01, 1.0)), max_size=4))
-def test_program_controllers_survive_the_shell(rows: list[tuple[int, float, float, float]]) -> None:
-    contractions = [
-        {"segment": segment, "start_s": start, "stop_s": start + length, "activation": level}
-        for segment, start, length, level in rows
-    ]
-    assert_same_run(Case(PLANAR, {"controller": {"kind": "program", "contractions": contractions}}))
-
-
 def test_recording_is_sparse_unless_the_case_says_otherwise() -> None:
     case = Case(CHAIN, {"duration_s": 5.0})
     sparse, usual = case.config.record, load_config(CHAIN).record

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,7 @@ from hypothesis import strategies as st
 from annelid.config import load_config
 from annelid.errors import ConfigError
 from annelid.experiment import store
-from annelid.experiment.check import HALF, MORE, RESOLVED, Check, check, compare, refinements
+from annelid.experiment.check import RESOLVED, Check, check, compare, refinements
 from annelid.experiment.outcome import Outcome, outcome
 from annelid.experiment.store import Done
 from annelid.output import write_json
@@ -31,29 +32,21 @@ def of(run: Outcome, **numbers: Any) -> Outcome:
     return replace(run, summary=replace(run.summary, **numbers))
 
 
+HALF = "half the step (0.5 ms)"
+
+
 def compared(run: Outcome, finer: Done) -> Check:
-    (half, *_), left_out = refinements(load_config("riddle2022-planar"))
-    return compare(run, {half: finer}, left_out)
+    return compare(run, refinements(load_config("riddle2022-planar")), {HALF: finer})
 
 
-def test_rods_are_refined_in_step_and_mesh_and_others_say_what_is_left() -> None:
-    (half, more), left_out = refinements(load_config("riddle2023-rods"))
-    assert (half.name, half.changes["clock.physics_timestep_s"]) == (HALF, 0.005)
-    assert (more.name, more.changes) == (MORE, {"body.mesh.elements_per_side": 3})
-    assert left_out == ""
-    for preset, words in (
-        ("riddle2023", "A chain keeps the paper's elements"),
-        ("riddle2022-planar", "has no elements"),
-    ):
-        (only,), sentence = refinements(load_config(preset))
-        assert only.name == HALF
-        assert words in sentence
-
-
-def test_a_step_whose_half_does_not_fit_is_refused_with_the_nearest_that_do() -> None:
-    odd = load_config("riddle2023-rods", {"clock.physics_timestep_s": 0.005, "record.signals_interval_s": 0.005})
-    with pytest.raises(ConfigError, match=r"clock\.physics_timestep_s = 0\.005: .* set it to 0\.004 or 0\.006"):
-        refinements(odd)
+def test_rods_are_refined_in_step_and_mesh_and_others_in_step_alone() -> None:
+    (half, more) = refinements(load_config("riddle2023-rods")).items()
+    assert half[0] == "half the step (5 ms)"
+    assert half[1]["clock.physics_timestep_s"] == 0.005
+    assert more == ("one more element a side (3)", {"body.mesh.elements_per_side": 3})
+    for preset in ("riddle2023", "riddle2022-planar"):
+        (only,) = refinements(load_config(preset))
+        assert only.startswith("half the step")
 
 
 @settings(max_examples=25)
@@ -68,6 +61,16 @@ def test_a_number_moves_by_its_relative_change_and_a_share_by_its_own(planar: Ou
     assert ("not resolved" in found.cell("period_s")) != found.resolved
     share = compared(of(planar, middle_deficit_mean=0.01), Done(of(planar, middle_deficit_mean=0.01 + 0.02 * factor)))
     assert share.largest("middle_deficit_mean") == pytest.approx(0.02 * factor)
+
+
+def test_a_segment_that_has_no_number_is_not_compared(planar: Outcome) -> None:
+    name = "elongation_mean_max_m"
+    for before, after, moved in (
+        ([2.0, None], [2.5, None], 0.25),
+        ([2.0, None], [2.0, 2.0], math.inf),
+        ([None], [None], 0.0),
+    ):
+        assert compared(of(planar, **{name: before}), Done(of(planar, **{name: after}))).largest(name) == moved
 
 
 def test_what_is_lost_or_in_another_order_is_said(planar: Outcome, tmp_path: Path) -> None:

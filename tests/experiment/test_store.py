@@ -33,7 +33,7 @@ IMPOSSIBLE = Case(PLANAR, {"body.gain": 1e4, "duration_s": 0.1})
 
 
 class Here(Executor):
-    """Computes in this process, but loses what the test says, or does not see the store's folder."""
+    """Computes in this process, but loses what the test says, or has another disk."""
 
     def __init__(self, *script: str) -> None:
         self.keys: list[str] = []
@@ -47,8 +47,10 @@ class Here(Executor):
             future.cancel()
             future.set_running_or_notify_cancel()
             return future
+        if what == "elsewhere":
+            args = (*args[:2], args[2].replace("/riddle", "/elsewhere/riddle"))
         try:
-            future.set_result(fn(*args[:3], "of another machine") if what == "away" else fn(*args, **kwargs))
+            future.set_result(fn(*args, **kwargs))
         except Exception as error:
             future.set_exception(error)
         return future
@@ -118,9 +120,8 @@ def test_a_run_that_a_guard_stops_is_an_outcome(tmp_path: Path) -> None:
     assert json.loads((tmp_path / OUTCOME_NAME).read_text())["message"]
 
 
-@pytest.mark.parametrize("script", [[], ["away"]])
-def test_a_store_may_keep_the_numbers_only(tmp_path: Path, script: list[str]) -> None:
-    store = Store(tmp_path, Here(*script), keep="outcomes")
+def test_a_store_may_keep_the_numbers_only(tmp_path: Path) -> None:
+    store = Store(tmp_path, Here(), keep="outcomes")
     store.compute([planar()])
     assert sorted(path.name for path in store.path(planar()).iterdir()) == [OUTCOME_NAME]
     assert planar() in store
@@ -139,10 +140,16 @@ def test_a_run_that_two_stores_compute_at_once_is_there_once(tmp_path: Path) -> 
     assert {path.name for path in folders(stores[0])} == {stores[0].path(planar(seed)).name for seed in range(3)}
 
 
-def test_a_worker_with_other_code_is_refused(tmp_path: Path) -> None:
+def test_a_worker_with_other_code_or_without_the_folder_is_refused(tmp_path: Path) -> None:
+    text = planar().config.model_dump_json()
     with pytest.raises(ClusterError, match="has other code: install the same versions"):
-        attempt("another key", planar().config.model_dump_json(), str(tmp_path / "run"), "mark")
+        attempt("another key", text, str(tmp_path / "run"))
+    with pytest.raises(ClusterError, match=r"does not see .*elsewhere: name a folder with -o that all machines share"):
+        attempt(case_key(planar()), text, str(tmp_path / "elsewhere" / "run"))
     assert not list(tmp_path.iterdir())
+    (tmp_path / "elsewhere").mkdir()
+    with pytest.raises(ClusterError, match="a worker's run is not in"):
+        Store(tmp_path, Here("elsewhere")).compute([planar()])
 
 
 def test_workers_that_are_lost_end_the_call_and_what_is_done_is_kept(tmp_path: Path) -> None:

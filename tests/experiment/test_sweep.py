@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
 import json
-import re
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -18,11 +16,10 @@ from hypothesis import strategies as st
 import annelid
 from annelid.config import Study, load_study
 from annelid.errors import ConfigError
-from annelid.experiment.search_space import spread_evenly, unit_samples
+from annelid.experiment.search_space import spread_evenly
 from annelid.experiment.sweep import (
     Plan,
     Sweep,
-    checked_sentence,
     flattened,
     plan_of,
     results_table,
@@ -101,15 +98,6 @@ def test_samples_keep_to_their_ranges_and_choices(design: str, n: int, seed: int
         assert scheme in ("euler", "heun")
 
 
-@settings(max_examples=15)
-@given(n=st.integers(1, 60), p=st.integers(1, 6), seed=st.integers(0, 2**32 - 1))
-def test_a_latin_hypercube_has_one_sample_in_every_stratum_of_every_variable(n: int, p: int, seed: int) -> None:
-    shares = unit_samples("lhs", n, p, seed)
-    assert shares.shape == (n, p)
-    for column in shares.T:
-        assert sorted(np.floor(column * n).astype(int).tolist()) == list(range(n))
-
-
 def test_fields_may_be_nested_and_lack_their_units() -> None:
     nested = load_study(
         {
@@ -161,7 +149,7 @@ def test_what_is_no_study_is_refused_in_a_sentence(subtests: pytest.Subtests, tm
         ({"outputs": ["period_s"], "rank": "travel_m"}, "rank = 'travel_m': must be one of the outputs"),
         ({"rank": "contact_duty"}, "rank = 'contact_duty'"),
         ({"keep": "all"}, "keep = 'all': must be one of"),
-        ({"cluster": {"kind": "slurm"}}, "a study names no cluster any more: leave it out, and give --scheduler"),
+        ({"cluster": {"kind": "slurm"}}, "unknown field 'cluster'"),
         ({"vary": [{"field": "body.gain", "values": [-1.0, -2.0]}]}, "body.gain = -1.0"),
     ):
         with subtests.test(f"{fields!r:.60}"):
@@ -214,17 +202,32 @@ def test_results_are_written_and_read_back_alike(done: Sweep) -> None:
     assert results_table(done).row_count == 4
 
 
+def test_a_rank_without_values_is_said(tmp_path: Path) -> None:
+    with pytest.warns(
+        UserWarning, match="rank = 'period_s': no run has a value of it, so the table and the figure begin"
+    ):
+        swept(study(ONE, rank="period_s"), tmp_path)
+
+
+def test_a_modulus_is_varied_with_the_other_that_follows() -> None:
+    vary = {"field": "body.strands.young_modulus_Pa", "values": [3e8, 1e9]}
+    with pytest.warns(UserWarning, match="leaves body.strands.shear_modulus_Pa = 200000000.0"):
+        plan_of(study([vary], preset="riddle2023-rods"))
+    plan = plan_of(study([vary | {"follow": {"body.strands.shear_modulus": 0.667}}], preset="riddle2023-rods"))
+    assert [case.config.body.strands.shear_modulus_Pa for _, case in plan.points] == [2.001e8, 6.67e8]  # type: ignore[attr-defined]
+
+
 def test_numbers_alone_may_be_kept_and_chosen(tmp_path: Path) -> None:
     data = annelid.sweep(
         study(ONE, keep="outcomes", outputs=["duration_s", "muscle_work_J"]).model_dump(by_alias=True), tmp_path
     )
-    assert {"duration_s", "muscle_work_J"} == set(data) - {"status", "reason", "run", "rhythm", "warnings", "check"}
+    assert {"duration_s", "muscle_work_J"} == set(data) - {"status", "reason", "run", "rhythm", "warnings"}
     assert not list(tmp_path.glob(f"runs/*/{FILE_NAME}"))
     assert data.duration_s.values == pytest.approx(0.2)
 
 
 @given(n=st.integers(0, 40), numbers=st.lists(st.integers(), unique=True, max_size=30).map(sorted))
-def test_runs_to_check_are_spread_from_the_first_to_the_last(n: int, numbers: list[int]) -> None:
+def test_items_are_picked_evenly_from_the_first_to_the_last(n: int, numbers: list[int]) -> None:
     chosen = spread_evenly(n, numbers)
     assert len(set(chosen)) == len(chosen) == min(n, len(numbers))
     places = [numbers.index(one) for one in chosen]
@@ -232,51 +235,3 @@ def test_runs_to_check_are_spread_from_the_first_to_the_last(n: int, numbers: li
     if len(chosen) > 1:
         assert (places[0], places[-1]) == (0, len(numbers) - 1)
         assert np.ptp(np.diff(places)) <= 1
-
-
-def test_a_sample_of_a_sweep_is_checked_and_kept(tmp_path: Path) -> None:
-    of = study([{"field": "body.gain", "values": [1.31, 1.4, 1.5, 1e4]}])
-    done = swept(of, tmp_path, check=2)
-    assert list(done.checks) == [0, 2], "the last fails, so that the third is the last"
-    assert done.data.check.values.tolist() == ["resolved", "", "resolved", ""]
-    assert checked_sentence(done) == "Checked 2 of 4 runs: all resolved."
-    write_results(done)
-    rows = list(csv.DictReader((tmp_path / "sweep.csv").read_text().splitlines()))
-    assert [row["check"] for row in rows] == ["resolved", "", "resolved", ""]
-    before = {path: path.stat().st_mtime_ns for path in tmp_path.glob(f"runs/*/{FILE_NAME}")}
-    assert len(before) == 5
-    again = swept(of, tmp_path, check=2)
-    assert [one.to_dict() for one in again.checks.values()] == [one.to_dict() for one in done.checks.values()]
-    assert {path: path.stat().st_mtime_ns for path in tmp_path.glob(f"runs/*/{FILE_NAME}")} == before
-
-
-def test_what_is_not_resolved_is_named_with_what_moves_most(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("annelid.experiment.check.RESOLVED", 1e-9)
-    done = swept(study([{"field": "body.gain", "values": [1.31, 1.4]}]), tmp_path, check=2)
-    found = checked_sentence(done)
-    assert re.fullmatch(r"Checked 2 of 2 runs: 0 resolved; not resolved: run 0 \(.* %\), run 1 \(.* %\)\.", found)
-    assert all(text.startswith("Not resolved: with half the step") for text in done.data.check.values)
-
-
-def test_what_cannot_be_checked_is_refused_before_anything_runs(tmp_path: Path) -> None:
-    of = study(ONE, preset="riddle2023-rods", set={"clock.physics_timestep_s": 0.005})
-    with pytest.raises(ConfigError, match=r"0\.005: half of it is no multiple .* set it to 0\.004 or 0\.006"):
-        swept(of, tmp_path / "out", check=1)
-    steps = {"field": "clock.physics_timestep_s", "values": [0.004, 0.003, 1.5]}
-    varied = study([steps], preset="riddle2023-rods")
-    with pytest.raises(ConfigError, match=r"clock\.physics_timestep_s = 0\.003: .* set it to 0\.002 or 0\.004"):
-        swept(varied, tmp_path / "out", check=1)
-    with pytest.raises(ConfigError, match="check = -1: must be at least 0"):
-        swept(of, tmp_path / "out", check=-1)
-    assert not list(tmp_path.iterdir())
-
-
-def test_an_interrupted_check_keeps_the_results(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupted(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("annelid.experiment.sweep.check_runs", interrupted)
-    with pytest.raises(KeyboardInterrupt):
-        annelid.sweep(study(ONE), tmp_path, check=1)
-    data = xr.load_dataset(tmp_path / "sweep.nc", engine="h5netcdf")
-    assert (data.status.item(), data.check.item()) == ("complete", "")

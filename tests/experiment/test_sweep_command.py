@@ -3,10 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
-import subprocess
-import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -48,21 +44,6 @@ def test_a_sweep_ends_with_a_table_and_its_files(annelid: Command) -> None:
     assert {row["run"] for row in rows if row["run"]} == folders
 
 
-@pytest.mark.usefixtures("runs_in_this_process")
-def test_a_checked_sweep_says_what_is_resolved_in_words_and_in_json(annelid: Command) -> None:
-    Path("study.toml").write_text(SHORT.replace("1.0, 1e4", "1.31, 1.4").replace("0.2", "1.0"))
-    words = ("sweep", "study.toml", "-o", "out", "--jobs", "1", "--check", "2")
-    done = annelid(*words)
-    assert done.exit_code == 0, done.err
-    assert done.out.splitlines()[-4] == "Checked 2 of 4 runs: all resolved."
-    assert "Checked" not in annelid(*words, "--quiet").out
-    results = json.loads(annelid(*words, "--json").out)["results"]
-    assert [row["check"] for row in results["sweep.csv"]] == ["resolved", None, None, "resolved"]
-    assert list(results["check"]) == ["0", "3"]
-    assert results["check"]["0"]["resolved"]
-    assert results["check"]["0"]["sentence"].startswith("Resolved: with half the step (0.5 ms)")
-
-
 def test_the_example_is_a_study_that_runs_after_its_first_line(annelid: Command) -> None:
     from annelid.config import load_study
     from annelid.experiment.sweep import plan_of
@@ -82,11 +63,6 @@ def test_the_example_is_a_study_that_runs_after_its_first_line(annelid: Command)
     [
         ((), "name a study"),
         (("missing.toml",), "cannot read"),
-        (
-            ("study.toml", "--cluster", "slurm"),
-            "--cluster and ANNELID_CLUSTER are no more: leave them out",
-        ),
-        (("study.toml", "--scheduler", "here", "--jobs", "2"), "--jobs is for processes of this machine"),
         (("study.toml", "--samples", "8"), "has no effect on design = 'grid'"),
         (("study.toml", "-o", "study.toml"), "study.toml is a file"),
     ],
@@ -99,26 +75,3 @@ def test_bad_input_ends_in_one_sentence_before_anything_runs(
     assert done.exit_code == 2
     assert says in " ".join(done.err.split())
     assert [path.name for path in Path().iterdir()] == ["study.toml"]
-
-
-@pytest.mark.slow
-def test_the_workers_of_a_scheduler_compute_a_sweep(annelid: Command) -> None:
-    Path("study.toml").write_text(SHORT)
-    dask = [str(Path(sys.executable).with_name("dask"))]
-    address = ["--port", "0", "--dashboard-address", ":0", "--scheduler-file", "at.json"]
-    worker = ["worker", "--scheduler-file", "at.json", "--nthreads", "1", "--no-nanny", "--no-dashboard"]
-    with subprocess.Popen([*dask, "scheduler", *address]) as scheduler:
-        try:
-            while not Path("at.json").exists():
-                assert scheduler.poll() is None
-                time.sleep(0.1)
-            with subprocess.Popen([*dask, *worker]) as computing:
-                try:
-                    done = annelid("sweep", "study.toml", "-o", "out", "--scheduler", "at.json")
-                finally:
-                    computing.kill()
-        finally:
-            scheduler.kill()
-    assert done.exit_code == EXIT_SOME_FAILED, done.err
-    data = xr.load_dataset("out/sweep.nc", engine="h5netcdf")
-    assert data.status.values.tolist() == [["complete"] * 2, ["failed"] * 2]

@@ -119,6 +119,7 @@ Track = tuple[tuple[str, ...], tuple[np.ndarray, ...], dict[str, Any], np.ndarra
 TRACKS: dict[str, Track] = {
     "columns": (("head_x,head_y,tail_x,tail_y",), (HEAD, TAIL), PX, DISTANCE),
     "columns with units": (("head_x_mm,head_y_mm,tail_x_mm,tail_y_mm",), (HEAD, TAIL), {}, DISTANCE),
+    "TRex": (("X#head (mm),Y#head (mm),X#tail (mm),Y#tail (mm)",), (HEAD, TAIL), {}, DISTANCE),
     "three dimensions": (("head X,head Y,head Z,tail X,tail Y,tail Z",), (HEAD, ZERO, TAIL, HIGH), PX, DEEP),
     "confidence": (("head_x,head_y,head_conf,tail_x,tail_y",), (HEAD, UNSURE, TAIL), PX, GAP),
     "DeepLabCut": (("scorer" + ",net" * 6, BODY_PARTS, COORDS), (FRAME, HEAD, UNSURE, TAIL, SURE), PX, GAP),
@@ -227,7 +228,7 @@ def test_what_would_be_read_wrong_is_refused(subtests: pytest.Subtests, tmp_path
             read(tmp_path, "log.csv", content, **MAP)
         assert "\n" not in str(refused.value)
     savemat(tmp_path / "matrix.mat", {"data": np.ones((10, 3))})
-    with pytest.raises(UnreadableText, match="'data' is a matrix without names"):
+    with pytest.raises(UnreadableText, match=r"'data' is a matrix without names: .* t = data\(:, 1\)"):
         read_measured(tmp_path / "matrix.mat", LogMap.model_validate(MAP))
 
 

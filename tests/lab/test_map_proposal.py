@@ -29,11 +29,28 @@ LOGS = {
         {"seg0_left_mm": ("stretch_length[1, left]", 1e-3 * LENGTHS_MM),
          "seg1_left_mm": ("stretch_length[2, left]", 1e-3 * LENGTHS_MM)},
     ),
+    "a student's Arduino": (
+        "millis,seg1_length_mm,Length 2 (mm),PWM3\n" + rows(TIMES_MS, LENGTHS_MM, LENGTHS_MM, 0 * TIMES_MS),
+        {},
+        {"seg1_length_mm": ("stretch_length[1, mean]", 1e-3 * LENGTHS_MM),
+         "Length 2 (mm)": ("stretch_length[2, mean]", 1e-3 * LENGTHS_MM)},
+    ),
+    "a lone point": (
+        "Elapsed Time (s),x_mm,y_mm\n" + rows(1e-3 * TIMES_MS, TIMES_MS, 0 * TIMES_MS),
+        {},
+        {"x_mm": ("travel", 1e-3 * TIMES_MS)},
+    ),
     "tracker": (
         "scorer,net,net,net\nbodyparts,head,head,head\ncoords,x,y,likelihood\n"
         + rows(TIMES_MS / 40, TIMES_MS, 0 * TIMES_MS, 1 + 0 * TIMES_MS),
         {"rate_Hz": 25, "m_per_px": 1e-3},
         {"head": ("travel", 1e-3 * TIMES_MS)},
+    ),
+    "TRex": (
+        "frame,time_s,X#wcentroid (cm),Y#wcentroid (cm),missing\n"
+        + rows(TIMES_MS / 40, 1e-3 * TIMES_MS, 50.0 + 0.1 * TIMES_MS, 0 * TIMES_MS, 0 * TIMES_MS),
+        {},
+        {"wcentroid": ("travel", 1e-3 * TIMES_MS)},
     ),
     "motion capture": (
         "Format Version,1.23,Capture Frame Rate,25.0,Length Units,Millimeters\nFrame,Time (Seconds),head.X,head.Y\n"
@@ -66,6 +83,14 @@ def test_a_number_at_the_end_of_a_name_is_no_unit(tmp_path: Path) -> None:
     proposal, missing = proposed_map(tmp_path / "log.csv")
     assert tomllib.loads(proposal)["map"]["seg_2"] == {"signal": "stretch_length[2, mean]"}
     assert missing == ['the unit of "seg_1"', 'the unit of "seg_2"']
+
+
+def test_counts_of_a_potentiometer_need_a_scale(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text("millis,pot1,pot2\n" + rows(TIMES_MS, TIMES_MS, TIMES_MS))
+    proposal, missing = proposed_map(tmp_path / "log.csv")
+    column = {"signal": "stretch_length[1, mean]", "unit": "1", "offset": "free"}
+    assert tomllib.loads(proposal)["map"]["pot1"] == column
+    assert missing == [f'scale, the metres in a count, of "pot{n}"' for n in (1, 2)]
 
 
 def test_several_animals_and_unknown_units_are_left_to_the_user(tmp_path: Path) -> None:

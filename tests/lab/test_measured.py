@@ -186,6 +186,11 @@ REFUSED: dict[str, tuple[Change, dict[str, object], str]] = {
     "a clock that is too coarse": (lambda log: log.assign(t_ms=log["t_ms"] // 100 * 100), {}, "repeat the time"),
     "no such column": (lambda log: log.drop(columns="s3_mm"), {}, "no column 's3_mm': .*s1_mm"),
     "no time": (lambda log: log.drop(columns="t_ms"), {}, "no column 't_ms'"),
+    "a time without a unit": (
+        lambda log: log.rename(columns={"t_ms": "t"}),
+        {"time": "t"},
+        "_s, or write time_unit = .s",
+    ),
     "a column twice": (lambda log: log.rename(columns={"s3_mm": "s1_mm"}), {}, "two columns 's1_mm'"),
     "mostly gaps": (lambda log: with_cells(log, "s1_mm", slice(100, 800), np.nan), {}, "no number in 8. %"),
     "too short": (lambda log: log.iloc[:12], {}, "too short to compare"),
@@ -244,6 +249,18 @@ def test_a_tracked_point_travels_along_its_net_motion(run: Run, tmp_path: Path) 
     pd.DataFrame({"head_x": 50 + 0.6 * ahead, "head_y": 90 - 0.8 * ahead}).to_csv(tmp_path / "log.csv", index=False)
     given_map = {"rate_Hz": 25.0, "time": None, "m_per_px": 1e-3, "lag_s": 0.0, "map": {"head": "travel"}}
     assert compared(run, tmp_path / "log.csv", **given_map).signals["head"].rms < 0.004
+
+
+def test_travel_counts_from_anywhere_and_one_that_goes_backward_is_noted(run: Run, tmp_path: Path) -> None:
+    log = log_of(run)
+    time, travel, _ = run_series(run, "travel")
+    log["x_mm"] = 509.3 + 1e3 * np.interp(log["t_ms"] / 1e3 + LAG_S, time, travel)
+    fields: dict[str, object] = {"map": {"x_mm": "travel"}, "lag_s": LAG_S}
+    found = agreement_of(run, log, tmp_path, **fields)
+    assert found.signals["x_mm"].rms < 1e-4
+    assert "backward" not in " ".join(found.notes)
+    found = agreement_of(run, log.assign(x_mm=-log["x_mm"]), tmp_path, **fields)
+    assert any("x_mm goes backward" in note for note in found.notes)
 
 
 def test_a_reference_that_is_none_is_refused(subtests: pytest.Subtests, run: Run) -> None:

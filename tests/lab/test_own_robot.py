@@ -6,6 +6,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+import gymnasium
 import numpy as np
 import pytest
 
@@ -183,14 +184,14 @@ REFUSED = {
     "no segment": (
         EXAMPLE,
         {"actuators": ["pull_{segment}"]},
-        "no actuator named pull_1; it has ring_1, ring_2, ring_3",
+        r"no actuator named pull_1; it has ring_1, ring_2, ring_3: write actuators = \[.ring_\{segment\}.\]",
     ),
-    "no sensor": (EXAMPLE, {"sensors": ["s_{segment}"]}, "no sensor named 's_1'; it has stretch_1"),
+    "no sensor": (EXAMPLE, {"sensors": ["s_{segment}"]}, "no tendon, joint or sensor named 's_1'; it has s1, s2"),
     "no place": (EXAMPLE, {"actuators": ["ring"]}, r"must have \{segment\} once"),
     "no actuator": (
         '<mujoco><worldbody><geom size="1"/></worldbody></mujoco>',
         {},
-        "no actuator named ring_1; it has none",
+        "no actuator named ring_1; it has none: without any it can be an arena",
     ),
     "busy engine": ('<mujoco><option iterations="1000000"/></mujoco>', {}, "at most 10000"),
 }
@@ -248,7 +249,8 @@ def test_what_a_robot_includes_is_read_from_its_folder(tmp_path: Path) -> None:
     (tmp_path / "parts" / "motors.xml").write_text(f"<mujocoinclude>{parts[start:end]}</mujocoinclude>")
     robot_file = tmp_path / "robot.xml"
     robot_file.write_text(f'{parts[:start]}<include file="parts\\motors.xml"/>{parts[end:]}')
-    assert load_config(robot_file).body == whole.body
+    in_two = load_config(robot_file)
+    assert mjcf_text(in_two).replace("\n", "") == mjcf_text(whole).replace("\n", "")
     outside = tmp_path.parent / f"{tmp_path.name}.xml"
     outside.write_text("<mujocoinclude/>")
     for file in (f"../{outside.name}", str(outside), "robot.xml", "parts/none.xml"):
@@ -274,8 +276,64 @@ def test_what_is_no_robot_is_refused_with_its_line_and_what_to_do(text: str, wor
         load_config(tmp_path / "robot.xml")
 
 
+def test_what_the_engine_refuses_has_its_line(tmp_path: Path) -> None:
+    text = one_motor('<damper\nname="ring_1" joint="s" ctrlrange="-3 0"/>').replace("<worldbody>", "\n<worldbody>")
+    (tmp_path / "robot.xml").write_text(text)
+    with pytest.raises(ConfigError, match="control range cannot be negative Element 'damper', line 3"):
+        plant_of(load_config(tmp_path / "robot.xml"))
+
+
+ASSETS = Path(gymnasium.__file__).parent / "envs" / "mujoco" / "assets"
+GYMNASIUM = {
+    "swimmer": ('["motor{segment}_rot"]', 'kind = "sine"', 2),
+    "ant": ('["hip_{segment}", "ankle_{segment}"]', 'kind = "timed"', 4),
+}
+
+
+@pytest.mark.parametrize("name", GYMNASIUM)
+def test_robots_of_gymnasium_run_with_a_file_of_ten_lines(name: str, tmp_path: Path) -> None:
+    names, controller, n_segments = GYMNASIUM[name]
+    text = (
+        f'extends = "{name}.xml"\nduration_s = 0.2\n[body]\nactuators = {names}\nsensors = {names}\n'
+        f"[controller]\n{controller}\n[guard]\nkinetic_energy_J = 1000.0\n"
+    )
+    assert len(text.splitlines()) <= 10
+    (tmp_path / f"{name}.xml").write_bytes((ASSETS / f"{name}.xml").read_bytes())
+    (tmp_path / "robot.toml").write_text(text)
+    with pytest.warns(UserWarning, match="are angles"):
+        run = annelid.simulate(load_config(tmp_path / "robot.toml"), tmp_path / "run", progress=False)
+    assert run.status == "complete"
+    assert run.config.body.n_segments == n_segments
+    assert run.data["ring_length"].attrs["units"] == "rad"
+    assert np.ptp(run.data["ring_length"].values) > 0.1
+
+
+def test_attributes_of_the_file_are_fields() -> None:
+    stiff = robot(changes={"body.attributes.position.ring_1.kp": 50.0, "body.attributes.geom.floor.friction": "0.3"})
+    model = plant_of(stiff).model
+    assert model.actuator("ring_1").gainprm[0] == 50.0
+    assert model.geom("floor").friction[0] == 0.3
+    for path, words in (
+        ("position.ring_9.kp", "body.attributes: the file has 0 <position> named 'ring_9': did you mean"),
+        ("position.ring_1.file", "cannot have this attribute"),
+        ("position.ring_1.kp", "numbers must be finite"),
+    ):
+        with pytest.raises(ConfigError, match=words):
+            robot(changes={f"body.attributes.{path}": 1e9})
+
+
+def test_a_scene_is_the_arena_of_a_robot() -> None:
+    scene = '<mujoco><worldbody><geom name="block" type="box" pos="0 0 0.03" size="0.5 0.5 0.03"/></worldbody></mujoco>'
+    config = robot(changes={"arena.kind": "scene", "arena.xml": scene, "arena.gravity_m_per_s2": 3.7})
+    plant = plant_of(config)
+    assert plant.total_mass_kg == pytest.approx(0.8)
+    assert held(plant, 0.0, 1000).contact_force_N[:, 2].sum() == pytest.approx(0.8 * 3.7, rel=0.02)
+    assert plant.data.xpos[1, 2] == pytest.approx(0.06 - 0.009 + 0.03, abs=2e-3)
+    assert "scene/block" in mjcf_text(config)
+
+
 def test_the_section_has_its_own_ground() -> None:
-    with pytest.raises(ConfigError, match=r"arena has no effect on body\.kind = 'mjcf'"):
+    with pytest.raises(ConfigError, match=r"arena\.kind = 'floor' cannot be beside .*: --arena takes a scene"):
         robot(changes={"arena.kind": "floor"})
     with pytest.raises(ConfigError, match=r"trial.pull = 0.1: body.kind = 'mjcf' cannot be pulled"):
         robot(changes={"trial.pull": 0.1})

@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from annelid.analysis import lengthening_score, rhythm_score, summary
+from annelid.body import bearable_force_N, rhombus_of
 from annelid.body.assemble import MOST_ORDERED_BODIES
 from annelid.body.worm import WormBody
 from annelid.config import RunConfig, load_config
@@ -53,6 +54,28 @@ def test_a_tapering_worm_has_ranges_and_forces_ring_by_ring() -> None:
     assert not check(config)
     with pytest.raises(ConfigError, match=r"radius_m.2 = -"):
         similar_worm(0.05, rear_radius_m=-0.01)
+
+
+def test_springs_forces_and_weights_follow_strands_of_ones_own() -> None:
+    def numbers(config: RunConfig) -> tuple[float, float, float, float]:
+        body = config.body
+        assert isinstance(body, WormBody)
+        strands, side_m = body.strands, rhombus_of(body).side_m
+        springs_N_per_m = strands.bending_rigidity_Nm2 / side_m**3
+        return (
+            body.springs.one_number("stiffness_N_per_m") / springs_N_per_m,
+            body.rings.forces(1)[0] / bearable_force_N(body),
+            body.pins.one_number("mass_kg") / (strands.one_number("linear_density_kg_per_m") * side_m),
+            strands.one_number("shear_modulus_Pa") / strands.one_number("young_modulus_Pa"),
+        )
+
+    own = worm(0.05, 5, 8, None, None, 0.05, 0.001, 9e8)
+    assert isinstance(own.body, WormBody)
+    assert (own.body.strands.radius_m, own.body.strands.young_modulus_Pa) == (0.001, 9e8)
+    mesh = own.body.geometry()
+    assert np.diff(mesh.plane_x_m[mesh.ring_planes]) == pytest.approx(0.05, rel=1e-4)
+    assert numbers(own) == pytest.approx(numbers(worm(0.05, 5, 8)), rel=1e-3)
+    assert not check(own)
 
 
 def test_similar_worms_move_alike(tmp_path: Path) -> None:
@@ -101,6 +124,8 @@ def test_a_geometry_that_cannot_work_is_refused(subtests: pytest.Subtests) -> No
         ((0.05, 3, 12, -1.0), "length_m must be positive, not -1"),
         ((0.05, 3, 7), "n_helices = 7: .*even"),
         ((0.05, 2), "n_segments = 2"),
+        ((0.05, 3, 12, None, None, 0.5), "segment_length_m = 0.5 does not fit 3 segments of radius 0.05 m"),
+        ((0.05, 3, 12, 0.3, None, 0.1), "length_m and segment_length_m say the same"),
         ((-1.0,), "radius_m = -1"),
         ((0.002,), "too small for the engine's numbers; .* must be at least 2.* times as large"),
     ):

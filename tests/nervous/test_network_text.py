@@ -1,7 +1,5 @@
 """Networks as TOML and as Markdown."""
 
-import re
-
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -134,14 +132,3 @@ def small_network() -> Network:
     network.add_input("stimulus", ["up", "down|side"])
     network.add_output("read", "up")
     return network
-
-
-def test_table_lists_all_with_units_and_escapes_bars():
-    table = small_network().table()
-    assert "| neuron | C (nF) | Gm (uS) | rest (mV) | bias (nA) | start (mV) | also |" in table
-    assert "| down\\|side | 5 | 1 | 0 | 0 | 0 |  |" in table
-    assert "| up | down\\|side | excitatory | 0.5 | 194 | 0 to 20 mV |" in table
-    assert "| stimulus | up, down\\|side |" in table
-    for line in table.splitlines():
-        if line.startswith("|"):
-            assert len(re.findall(r"(?<!\\)\|", line)) in {3, 7, 8}

@@ -166,19 +166,6 @@ def test_copies_have_the_bits_of_single_networks_whose_gates_stay_between_0_and_
         assert np.all((state.gate >= 0.0) & (state.gate <= 1.0))
 
 
-@settings(max_examples=30)
-@given(network=networks(), scheme=schemes, chunks=st.lists(st.integers(0, 9), min_size=1, max_size=5))
-def test_many_steps_in_one_call_have_the_bits_of_many_calls(network, scheme, chunks):
-    stepper = network.compile(TIMESTEP_MS, scheme, 2)
-    together, singly = stepper.initial_state(), stepper.initial_state()
-    for n_steps, inputs in zip(chunks, currents(network, 0, len(chunks), 2), strict=True):
-        stepper.advance(together, inputs, n_steps)
-        for _ in range(n_steps):
-            stepper.advance(singly, inputs)
-        np.testing.assert_array_equal(together.potential, singly.potential)
-        np.testing.assert_array_equal(together.gate, singly.gate)
-
-
 def half_centre_with_neighbour(timestep_ms, scheme, duration_ms):
     """A smooth stretch of motion, clear of the corners of the synapses' clip."""
     p = PeristalsisParameters()

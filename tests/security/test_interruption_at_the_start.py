@@ -46,29 +46,6 @@ def test_interrupted_while_it_loads_it_ends_in_a_sentence(tmp_path: Path, module
     assert done.returncode == 130
 
 
-def test_terminated_while_it_loads_it_says_nothing(tmp_path: Path) -> None:
-    code = AT_IMPORT.format(module="typer", signal="SIGTERM")
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False, timeout=120
-    )
-    assert (done.returncode, done.stderr) == (-signal.SIGTERM, "")
-
-
-def test_where_interruptions_are_ignored_they_stay_so(tmp_path: Path) -> None:
-    code = AT_IMPORT.replace('"run", "riddle2023-rods", "--duration", "0.1", "--no-video", "--out", "out"', '"presets"')
-    done = subprocess.run(
-        [sys.executable, "-c", code.format(module="typer", signal="SIGINT")],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=False,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_IGN),
-        timeout=120,
-    )
-    assert done.returncode == 0, done.stderr
-    assert "riddle2023" in done.stdout
-
-
 def test_a_terminal_that_knows_ascii_only_is_served(tmp_path: Path) -> None:
     (tmp_path / "w.toml").write_text('extends = "riddle2022-planar"\nsummary = "🪱"\n', encoding="utf-8")
     done = subprocess.run(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from math import cos, radians, sin
-from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -12,10 +11,8 @@ import pytest
 
 from annelid.arena.ground import surface_of
 from annelid.config import RunConfig, load_config
-from annelid.errors import ConfigError
 from annelid.protocols import Array
 from annelid.simulation.ground import facing
-from annelid.simulation.loop import simulate
 from annelid.simulation.stepping import build_controller
 from annelid.simulation.worm import WormPlant
 
@@ -132,15 +129,6 @@ def test_setae_slide_forwards_as_a_block_does_and_hold_backwards() -> None:
     assert np.abs(up[3:]).max() < 0.01 * down[-1]
 
 
-def test_a_run_in_an_arena_continues_bit_for_bit(tmp_path: Path) -> None:
-    whole = simulate(config("pipe.taper", duration_s=0.2), tmp_path / "whole", progress=False)
-    simulate(config("pipe.taper", duration_s=0.1), tmp_path / "first", progress=False)
-    rest = simulate(config("pipe.taper", duration_s=0.2), tmp_path / "rest", resume=tmp_path / "first", progress=False)
-    ours, theirs = rest.data, whole.data.isel(time=whole.data["time"] >= rest.data["time"][0])
-    for name in ("ring_length", "contact_force", "center_of_mass"):
-        assert np.array_equal(ours[name].values, theirs[name].values), name
-
-
 def test_several_physics_steps_a_control_step_lay_the_ground_before_each() -> None:
     slow = config("pipe", clock__control_timestep_s=0.01, clock__physics_timestep_s=0.005)
     fast = config("pipe", clock__control_timestep_s=0.005, clock__physics_timestep_s=0.005)
@@ -170,11 +158,6 @@ def test_a_worm_that_leaves_its_pipe_is_stopped() -> None:
     alarm = plant.alarm()
     assert alarm is not None
     assert "guard.height_m" in alarm
-
-
-def test_a_narrow_pipe_refuses_a_worm_that_does_not_fit_into_its_entry() -> None:
-    with pytest.raises(ConfigError, match=r"arena\.bore_m = 0\.15: .*at least body\.mesh\.radius_m = 0\.16"):
-        config("pipe", arena__bore_m=0.15)
 
 
 def leak_m(arena: str, duration_s: float) -> tuple[float, float]:

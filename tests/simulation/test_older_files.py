@@ -21,7 +21,7 @@ from annelid.simulation.runfile import migrated, read_config, verify_run
 
 NEWER_THAN_0_1 = {
     "": ["turning", "published"],
-    "body": ["heading_deg", "joints"],
+    "body": ["joints"],
     "body.strands": ["damping_time_s"],
     "body.springs": ["sensors"],
     "body.rings": ["kind"],
@@ -83,6 +83,8 @@ POSTS = {**RODS, "arena": {"kind": "floor", "posts": [[1.0, 2.0, 0.1]]}}
         (ROBUST, 6, {"controller.entrainment": 0.0}, "controller.entrainment was 0.0"),
         (BLIND, 6, {"trial.loss_s": 0.2, "trial.push_s": 0.5, "trial.delay_s": 0.0}, None),
         (BLIND, 6, {"trial.delay_s": 0.1}, "trial.delay_s was 0.1"),
+        (BLIND, 6, {"trial.loss_s": 0.2, "body.heading_deg": 0.0}, None),
+        (RODS, 6, {"body.heading_deg": 90.0}, "its travel is told along -x"),
         (ROUGH, 5, {"arena.posts": [[1.0, 2.0, 0.1]]}, "arena.posts was"),
     ],
 )

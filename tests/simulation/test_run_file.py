@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import errno
-import io
 import itertools
 import json
 import os
@@ -175,20 +174,6 @@ def test_no_room_is_said_in_megabytes_before_anything_is_made(tmp_path: Path, mo
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("code", [errno.ENOSPC, errno.EROFS])
-def test_a_disk_that_refuses_the_layout_leaves_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: int
-) -> None:
-    def refuse(draft: Path, needed: int) -> None:
-        draft.write_bytes(b"half")
-        raise OSError(code, os.strerror(code))
-
-    monkeypatch.setattr(container, "_try_room", refuse)
-    with pytest.raises(RunFileError, match=os.strerror(code)):
-        toy_run(tmp_path / "deep" / "er")
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_an_overwritten_run_survives_a_failed_layout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     old = toy_run(tmp_path).path.read_bytes()
 
@@ -224,16 +209,6 @@ def test_a_disk_that_fills_up_ends_the_run_with_a_readable_file(
     assert 0 < run.data.sizes["time"] < 41
     np.testing.assert_array_equal(run.data["control_steps"], 5 * np.arange(run.data.sizes["time"]))
     assert not run.data["stretch_length"].isnull().any()
-
-
-def test_what_a_file_takes_in_parts_is_written_whole(tmp_path: Path) -> None:
-    class Slow(io.FileIO):
-        def write(self, content: Any) -> int:
-            return super().write(bytes(content[:11]))
-
-    with Slow(tmp_path / "slow", "wb") as file:
-        digest.write_whole(file, bytes(range(256)))  # type: ignore[arg-type]
-    assert (tmp_path / "slow").read_bytes() == bytes(range(256))
 
 
 def test_a_disk_that_recovers_for_the_last_words_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -195,12 +195,6 @@ def test_pictures_show_things_where_they_are(tmp_path: Path) -> None:
     assert ends[:, 0].min() > run.data["crossing_position"].values[..., 0].min() - 0.1
 
 
-def test_a_heading_turns_the_worm_and_leaves_the_scene() -> None:
-    along, across = plant_in(BOX), plant_in(BOX, changes={"body.heading_deg": 90.0})
-    assert across.posture.objects == pytest.approx(along.posture.objects, abs=1e-12)
-    assert across.posture.heading == pytest.approx([0.0, -1.0, 0.0], abs=1e-9)
-
-
 def test_a_picture_is_a_height_field_with_white_high_and_its_first_row_to_the_left(tmp_path: Path) -> None:
     shades = np.zeros((3, 4), dtype=np.uint8)
     shades[0, 3] = 255

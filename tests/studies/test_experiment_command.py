@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,22 @@ def test_load_frame_writes_a_table_and_its_picture(annelid: Command) -> None:
     turn = int(table["displacement_mm"].argmax())
     assert table["force_N"][turn] == pytest.approx(table["tension_N"][turn] / (1 - np.exp(-1.0)), rel=1e-4)
     assert table["force_N"][-2] == pytest.approx(table["tension_N"][-2] / (np.exp(1.0) - 1), rel=1e-4)
+
+
+def test_a_load_frame_fits_the_worm_and_leaves_out_a_loop_of_another_size(annelid: Command) -> None:
+    small = (
+        "--set",
+        "body.mesh.radius_m=0.08",
+        "--set",
+        "body.mesh.angular_rate_rad_per_m=28",
+        "--diameter-share",
+        "0.1",
+    )
+    done = annelid("study", "load-frame", *small, "-o", "frame", "--json")
+    assert done.exit_code == 0, done.err
+    assert [*json.loads(done.out)["results"]["loops"]] == ["riddle2023-rods"]
+    table = np.genfromtxt("frame/load_frame.csv", delimiter=",", names=True)
+    assert table["displacement_mm"].max() == pytest.approx(0.1 * 2e3 * np.pi * 0.08, rel=0.05)
 
 
 @pytest.mark.parametrize(

@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 
 from annelid.analysis import rhythm_score
 from annelid.config import RunConfig, load_config
-from annelid.control import SineController, TimedController
+from annelid.control import OpenLoopController
 from annelid.control.open_loop import SineWave, TimedWave
 from annelid.errors import ConfigError
 from annelid.protocols import Controller, Records, Sensation, Stateful
-from annelid.simulation import simulate
+from annelid.simulation import build_plant, simulate
 from annelid_studies.oscillators import HeteroclinicController, PhaseChainController
 from annelid_studies.oscillators.controllers import HeteroclinicChannel, PhaseChain
 
@@ -33,9 +33,9 @@ def built(kind: str, n_segments: int = 3, n_muscles: int | None = None) -> Contr
     size = (n_segments, n_muscles or n_segments)
     match kind:
         case "sine":
-            return SineController(SineWave(), *size)
+            return OpenLoopController(SineWave(), *size)
         case "timed":
-            return TimedController(TimedWave(), *size)
+            return OpenLoopController(TimedWave(), *size)
         case "shc":
             return HeteroclinicController(HeteroclinicChannel(noise=1e-3), *size, 0.001)
         case _:
@@ -98,15 +98,15 @@ def test_three_by_one_and_two_by_two_are_the_authors_patterns() -> None:
     times = np.arange(6, 18, 0.5)
     turn = np.interp(np.arange(0, 6, 0.5), [0, 1, 2, 3, 6], [0, 1, 1, 0, 0])
     for wave, delay in ((TimedWave(), 1.0), (TimedWave(interval_s=2.0, waves=2), 2.0)):
-        assert TimedController(wave, 6, 6).cycle_s == 6.0
-        pattern = TimedController(wave, 6, 6).activation(times)
+        assert wave.cycle_s(6) == 6.0
+        pattern = wave.activation(times, 6)
         for segment in range(6):
             expected = np.tile(np.roll(turn, round(2 * delay * segment)), 2)
             np.testing.assert_allclose(pattern[:, segment], expected, atol=1e-6)
 
 
 def test_a_segment_rests_until_its_first_turn() -> None:
-    before = TimedController(TimedWave(), 6, 6).activation(np.arange(0, 6, 0.25))
+    before = TimedWave().activation(np.arange(0, 6, 0.25), 6)
     for segment in range(6):
         assert not before[: 4 * segment + 1, segment].any()
         assert before[4 * segment + 1, segment] == pytest.approx(0.25, abs=1e-6)
@@ -119,7 +119,7 @@ def test_a_timed_segment_holds_for_its_number_of_control_steps(rise: int, hold: 
     wave = TimedWave(rise_s=rise * dt, hold_s=hold * dt, fall_s=0.0, interval_s=interval)
     start = round((cycles * 6 + segment) * interval / dt)
     steps = np.arange(start, start + 2100)
-    on = TimedController(wave, 6, 6).activation(steps * dt)[:, segment]
+    on = wave.activation(steps * dt, 6)[:, segment]
     np.testing.assert_allclose(on[:rise], np.arange(rise) / max(rise, 1), atol=1e-6)
     np.testing.assert_allclose(on[rise : rise + hold], 1.0, atol=1e-6)
     assert not on[rise + hold :].any()
@@ -127,18 +127,18 @@ def test_a_timed_segment_holds_for_its_number_of_control_steps(rise: int, hold: 
 
 def test_a_timed_pattern_that_overtakes_itself_is_refused() -> None:
     with pytest.raises(ConfigError, match=r"rise_s \+ hold_s \+ fall_s = 3: must be at most 1\.5 s, the cycle of 3"):
-        TimedController(TimedWave(interval_s=0.5), 3, 3)
+        TimedWave(interval_s=0.5).build(RunConfig(), build_plant(load_config("riddle2022-planar")))
 
 
 @given(waves=st.integers(-2, 2), n=st.integers(3, 8), period=st.floats(0.5, 9.0), level=st.floats(0.1, 1.0))
 def test_a_sine_travels_by_its_number_of_waves(waves: int, n: int, period: float, level: float) -> None:
     wave = SineWave(period_s=period, waves=waves, level=level)
     times = np.linspace(0, period, 50)
-    activation = SineController(wave, n, n).activation(times)
+    activation = wave.activation(times, n)
     assert activation.min() >= 0
     assert activation.max() == pytest.approx(level)
     np.testing.assert_allclose(activation[0], activation[-1], atol=1e-9)
-    later = SineController(wave, n, n).activation(times + period * waves / n)
+    later = wave.activation(times + period * waves / n, n)
     np.testing.assert_allclose(later[:, 1:], activation[:, :-1], atol=1e-9)
 
 

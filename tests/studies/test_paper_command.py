@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from annelid.experiment.progress import LINE_EVERY_S, Lines, TimeLeft, study_progress
+from annelid.experiment.progress import LINE_EVERY_S, Lines, study_progress
 from annelid_studies.riddle2023.report_parts import Claim, Report, Table
 from annelid_studies.standard_cases import Effort
 from outcome import Command
@@ -118,7 +118,7 @@ def test_ctrl_c_tells_how_to_go_on(
 
 
 def test_without_a_terminal_progress_is_a_line(annelid: Command, asked: Asked) -> None:
-    assert annelid("paper").err == "running worms: 1 of 2 runs\n"
+    assert annelid("paper").err == "running worms: 1 of 2 runs, 50%\n"
 
 
 class Clock:
@@ -145,7 +145,7 @@ def test_lines_come_at_most_every_ten_seconds(clock: Clock) -> None:
         tell("running worms", second, 200, second / 200)
     lines = stream.getvalue().splitlines()
     assert len(lines) == 1 + 100 // LINE_EVERY_S
-    assert lines[1] == "running worms: 10 of 200 runs, about 3:10 left"
+    assert lines[1] == "running worms: 10 of 200 runs, 5%"
 
 
 def test_a_short_run_writes_no_line(clock: Clock) -> None:
@@ -155,17 +155,7 @@ def test_a_short_run_writes_no_line(clock: Clock) -> None:
         assert not stream.getvalue()
         clock.now = float(second)
         lines("simulating", 0, 0, second / 20)
-    assert stream.getvalue() == "simulating: about 0:10 left\n"
-
-
-def test_time_left_is_that_of_the_stage(clock: Clock) -> None:
-    left = TimeLeft()
-    assert left("running worms", 0.0) is None
-    clock.now = 60.0
-    assert left("running worms", 0.25) == pytest.approx(180.0)
-    assert left("drawing", 0.5) is None
-    clock.now = 70.0
-    assert left("drawing", 0.75) == pytest.approx(10.0)
+    assert stream.getvalue() == "simulating: 50%\n"
 
 
 def test_on_a_terminal_progress_is_a_bar(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,8 +6,8 @@ import csv
 from pathlib import Path
 
 from annelid.control.open_loop import TimedWave
-from annelid.control.pressure import PressureSns
 from annelid.control.sns import Sns
+from annelid_studies.pressure import PressureSns
 from annelid_studies.slip import (
     CASES,
     CONTROLLERS,

@@ -10,7 +10,7 @@ from rich.table import Table
 
 from annelid.analysis.comparison import compare
 from annelid.draw.canvas import segment_colors
-from annelid.draw.figures.comparison import lengths_figure, potentials_figure, travel_figure
+from annelid.draw.figures.comparison import lengths_figure, travel_figure
 from annelid.draw.summary_table import comparison_table, fields_table
 from annelid.errors import RunFileError
 from annelid.simulation.runfile import Run
@@ -42,7 +42,7 @@ def test_the_fields_of_other_kinds_are_left_to_json(planar_run: Run, rods_run: R
 
 
 def test_every_run_gets_its_colour(planar_run: Run, rods_run: Run, tmp_path: Path) -> None:
-    for draw in (lengths_figure, potentials_figure, travel_figure):
+    for draw in (lengths_figure, travel_figure):
         with Image.open(draw([planar_run, rods_run], ("planar", "rods"), tmp_path / "both.png")) as image:
             colors = {pixel for _, pixel in image.convert("RGB").getcolors(image.width * image.height) or ()}
         drawn = [tuple(int(color[i : i + 2], 16) for i in (1, 3, 5)) for color in segment_colors(2)]

@@ -12,10 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from annelid.config import load_config, preset_names
-from annelid.draw.scene import Skeleton
 from annelid.errors import ConfigError, RunFileError
 from annelid.live.history import History, Moment, history_of
-from annelid.live.lines_and_arrows import Painter, painter_of
+from annelid.live.lines_and_arrows import Painter
 from annelid.live.live_worm import LiveWorm, knobs_of
 from annelid.live.panel import MOST_SAMPLES, plots_of
 from annelid.live.player import Player, player_of
@@ -28,6 +27,7 @@ from annelid_lab.logs.agreement import compare_with_log, run_series
 from annelid_lab.logs.report import measured_plots
 
 FRAME_S = 0.04
+ROBOT = Path(__file__).parents[2] / "examples" / "robot" / "robot.xml"
 
 
 def history(n: int) -> History:
@@ -58,14 +58,6 @@ def test_a_refusal_is_shown_until_something_is_requested_again() -> None:
     requests.add(met.append, 2)
     requests.meet()
     assert (requests.notice, met) == ("", [1, 2])
-
-
-@pytest.mark.parametrize("preset", ["riddle2023-rods", "riddle2023"])
-def test_strands_at_rest_lie_where_the_mesh_is(preset: str) -> None:
-    anatomy = compile_worm(load_config(preset))
-    vertices, crossing = Skeleton(anatomy).locate(anatomy.model.qpos0)
-    np.testing.assert_allclose(vertices, anatomy.geometry.vertices_m, atol=1e-12)
-    np.testing.assert_allclose(crossing, anatomy.geometry.crossings_m, atol=1e-12)
 
 
 def test_a_picture_has_every_part() -> None:
@@ -268,10 +260,10 @@ def test_the_ground_is_there_and_a_ray_is_turned_into_the_axes_of_a_slope() -> N
         ("rails", posts, {"floor", "rail_left", "rail_right", "post_0"}),
     ):
         config = load_config("riddle2023-rods", overrides, arena=arena)
-        player, anatomy = player_of(config)
+        player, painter = player_of(config)
         server = Server()
         try:
-            stage = Stage(server, config, painter_of(anatomy, config, player.moment), player.moment)
+            stage = Stage(server, config, painter, player.moment)
             names = {"floor", "rail_left", "rail_right", "post_0", "relief", "pipe"}
             assert {name for name in names if server.scene.get_handle_by_name(f"/worm/ground/{name}")} == nodes
             for layer in LAYERS:
@@ -288,9 +280,8 @@ def test_the_ground_is_there_and_a_ray_is_turned_into_the_axes_of_a_slope() -> N
 
 
 def test_a_planar_worm_is_seen_from_its_side(planar_run: Run) -> None:
-    player, anatomy = player_of(planar_run)
-    first = player.history.at(0.0)
-    picture = painter_of(anatomy, planar_run.config, first).paint(first)
+    player, painter = player_of(planar_run)
+    picture = painter.paint(player.history.at(0.0))
     assert picture.strands.shape == picture.ring_colors.shape == (3 * 4, 2, 3)
     ends = planar_run.data["stretch_length"].values[0, :, 0].sum() / 2
     np.testing.assert_allclose(picture.strands[..., 0].min(), -ends, atol=1e-6)
@@ -298,6 +289,28 @@ def test_a_planar_worm_is_seen_from_its_side(planar_run: Run) -> None:
     living, _ = player_of(planar_run.config)
     living.tick(0.05)
     assert living.history.span_s[1] >= 0.05
+
+
+def test_a_robot_of_ones_own_is_seen_while_it_runs() -> None:
+    from annelid.live.scene_nodes import Stage
+    from annelid.live.server import Server
+
+    config = load_config(ROBOT, {"controller.kind": "timed"})
+    player, painter = player_of(config)
+    server = Server()
+    try:
+        stage = Stage(server, config, painter, player.moment)
+        heads = server.scene.get_handle_by_name("/worm/ground/1")
+        assert heads is not None
+        first = np.array(heads.position)
+        player.tick(1.0)
+        stage.show(player.moment)
+        assert np.abs(np.array(heads.position) - first).max() > 1e-3
+    finally:
+        server.stop()
+    rings = painter.paint(player.moment)
+    assert rings.rings.shape == rings.ring_colors.shape == (3, 2, 3)
+    assert painter.arrow_N == pytest.approx(2 * 9.81 * 0.8 / 3, rel=0.1)
 
 
 def test_names_of_neurons_stay_words_in_the_live_diagram() -> None:

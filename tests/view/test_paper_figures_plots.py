@@ -16,6 +16,7 @@ from annelid.body.worm import WormBody
 from annelid.config import load_config
 from annelid.draw.figures.network_diagram import (
     by_segment,
+    effect_of,
     labels_of,
     meanings_of,
     network_figure,
@@ -26,7 +27,6 @@ from annelid.nervous import Network
 from annelid.nervous.neurons import GapJunction, Neuron, Synapse, persistent_sodium
 from annelid.nervous.peristalsis import peristalsis_network
 from annelid.nervous.robust import robust_network
-from annelid.nervous.tables import effect_of
 from annelid_studies.riddle2023.figures import muscle_surface, robot_lengths
 
 

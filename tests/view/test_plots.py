@@ -8,7 +8,9 @@ from pathlib import Path
 import imageio.v3
 import numpy as np
 import pytest
+from matplotlib.colors import to_rgb
 
+from annelid.analysis.paper import published
 from annelid.draw.canvas import line_looks, segment_colors
 from annelid.draw.plots import figure7
 from annelid.errors import RunFileError
@@ -27,9 +29,23 @@ def test_figure7_is_a_picture_with_curves_on_white(planar_run: Run, picture: Pat
         assert np.any(np.all(pixels == wanted, axis=2)), f"nothing drawn in {color}"
 
 
-def test_lines_differ_in_dashes_in_grey_and_for_colour_blind_readers() -> None:
-    from matplotlib.colors import to_rgb
+def test_neurons_of_any_name_are_drawn(planar_run: Run, picture: Path) -> None:
+    n = planar_run.data.sizes["neuron"]
+    own = replace(planar_run, data=planar_run.data.assign_coords(neuron=[f"cell {i}" for i in range(n)]))
+    figure7(own, picture)
+    pixels = imageio.v3.imread(picture)[:400, :, :3].astype(int)
+    for color in segment_colors(min(n, 16)):
+        assert np.abs(pixels - 255 * np.array(to_rgb(color))).max(axis=2).min() < 2, f"no neuron drawn in {color}"
 
+
+def test_published_levels_are_drawn_under_the_papers_controller_only(rods_run: Run, picture: Path) -> None:
+    own = replace(rods_run, data=rods_run.data.assign_attrs(controller="mine"))
+    pictures = [imageio.v3.imread(figure7(run, picture))[-400:] for run in (rods_run, own)]
+    assert pictures[0].shape != pictures[1].shape or (pictures[0] != pictures[1]).any()
+    assert published(rods_run.config)
+
+
+def test_lines_differ_in_dashes_in_grey_and_for_colour_blind_readers() -> None:
     for n_lines in (2, 3, 4):
         looks = line_looks(n_lines)
         assert len({str(look["linestyle"]) for look in looks}) == n_lines

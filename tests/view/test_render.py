@@ -107,12 +107,6 @@ def test_impossible_videos_are_refused(planar_run: Run, tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize(("fps", "suffix"), [(1.0, "mp4"), (240.0, "mkv")])
-def test_possible_rates_are_written_whole(planar_run: Run, tmp_path: Path, fps: float, suffix: str) -> None:
-    target = render_video(planar_run, tmp_path / f"a.{suffix}", fps=fps, speed=fps / 10, size=(160, 96))
-    assert imageio.v3.imread(target).shape[0] == 31
-
-
 def an_ffmpeg(folder: Path, while_writing: str) -> Path:
     """An ffmpeg that reads videos as ever, but writes them in another way."""
     import imageio_ffmpeg

@@ -61,12 +61,12 @@ def elongation(data: xr.Dataset) -> Elongation:
 
 
 def middle_deficit(elongation_m: ArrayLike) -> float:
-    """How far the interior segments stay below the first: ``1 - mean(interior) / first``, NaN if that is unmoved.
+    """How far the interior segments stay below the first: ``1 - mean(interior) / first``, NaN without any or unmoved.
 
     With three segments this is the paper's "segment 2 below segment 1" (39.4 %).
     """
     values = np.asarray(elongation_m, dtype=float)
-    return _deficit(values[1:-1].mean(), values[0])
+    return _deficit(values[1:-1].mean() if len(values) > 2 else np.nan, values[0])
 
 
 def interior_deficit(elongation_m: ArrayLike) -> float:

@@ -14,7 +14,7 @@ import numpy as np
 from annelid.analysis.muscles import cable_work, muscle_work
 from annelid.analysis.numbers import number, ratio
 from annelid.analysis.rhythm import run_rhythm
-from annelid.analysis.track import first_heading, fitted_circle, track_of
+from annelid.analysis.track import FORWARDS, fitted_circle, track_of
 from annelid.protocols import Array
 from annelid.simulation.runfile import Run
 
@@ -142,7 +142,7 @@ def _steps(run: Run, marks: Array) -> tuple[Array, Array]:
     centre = run.data["center_of_mass"].sel(axis=["x", "y"]).values
     steps = np.diff(np.array([np.interp(marks, time, along) for along in centre.T]).T, axis=0)
     if run.config.body.geometry() is None or run.data.sizes.get("frame", 0) < 2:
-        return steps, np.broadcast_to(first_heading(run), steps.shape)
+        return steps, np.broadcast_to(FORWARDS, steps.shape)
     track = track_of(run)
     # Evenly over each cycle, whatever the interval of the frames.
     times = marks[:-1, np.newaxis] + np.diff(marks)[:, np.newaxis] * np.linspace(0.0, 1.0, 64, endpoint=False)

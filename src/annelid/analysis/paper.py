@@ -11,7 +11,7 @@ from annelid.analysis.comparison import differing_fields
 from annelid.analysis.summary import NUMBERS, Summary
 from annelid.config import RunConfig, load_config, preset_names
 from annelid.config.run import published_worms
-from annelid.control.sns import paper_controller
+from annelid.control.sns import NAME, paper_controller
 from annelid.textfiles import parse_json
 
 _ROBOT, _WORM = (published_worms()[name][0]["numbers"] for name in ("wang", "riddle2023"))
@@ -50,15 +50,19 @@ class Published:
     place: str
 
 
-def published(config: RunConfig) -> dict[str, Published]:
+def published(config: RunConfig, controller: str | None = None) -> dict[str, Published]:
     """Returns what has been published of the configured worm, keyed by the fields of `Summary`.
 
     These are the numbers that its field ``published`` names, in ``data/published.toml``, where the fields that the
     numbers are given for have those values, and the controller is the paper's unless they are of a robot.
+
+    Args:
+        config: The configuration.
+        controller: What the run file calls the controller, since one from Python may replace the configured one.
     """
     if config.published is None:
         return {}
-    of_papers = paper_controller(config.controller) is not None
+    of_papers = paper_controller(config.controller) is not None and controller in (None, NAME)
     for worm in published_worms()[config.published]:
         given = all(_value(config, path) == value for path, value in worm["given"].items())
         if given and (of_papers or worm.get("any_controller")):

@@ -16,7 +16,7 @@ from annelid.protocols import Array
 from annelid.simulation.runfile import Run
 
 CONTRACTED = 0.5  # activation above which a muscle counts as contracted (half of its range)
-LEAST_SEGMENTS = 3  # that can have a rhythm
+LEAST_SEGMENTS = 2  # that can have an order
 SHORTEST_S = 0.02  # contractions, and interruptions of one, that are shorter do not count in a score, s
 LEAST_LENGTHENING_M = 0.0025  # segments that lengthen by less than twice this are not moved, m
 DESIGN_INTERVAL_S = 0.875
@@ -257,7 +257,7 @@ def score(time_s: ArrayLike, activation: ArrayLike, interval_s: float = DESIGN_I
     1. silent: nothing has begun for longer than 2 expected intervals. Expected is the longest interval between any
        two successive onsets, and as long as no segment has gone through a cycle, no less than ``interval_s``.
     2. disordered: a cycle in which a neighbour in the ring does not contract exactly once.
-    3. None, too short: a segment has not contracted twice, or a pair of neighbours has no lag.
+    3. None, too short: a segment has not contracted twice, or a pair of neighbours has no lag; also of one segment.
     4. disordered: ``period_cv`` above 0.2; or lags of one pair with a mean resultant length below 0.5; or "regular but
        not a wave": the winding number W, the sum of the mean lags round the ring, is not in 1 .. N-1, or some segment
        is farther than 3/8 of a step of 1/N from its place in the even wave in which all lags are W/N.
@@ -270,17 +270,12 @@ def score(time_s: ArrayLike, activation: ArrayLike, interval_s: float = DESIGN_I
 
     Args:
         time_s: Sample times, s, rising, shape ``(n_times,)``.
-        activation: Activation of each segment, in [0, 1], shape ``(n_times, n_segments)``, at least 3 segments.
+        activation: Activation of each segment, in [0, 1], shape ``(n_times, n_segments)``.
         interval_s: Expected interval between successive onsets where the run shows none, s.
-
-    Raises:
-        ValueError: Fewer than 3 segments.
     """
     times = np.asarray(time_s, dtype=float)
     values = np.asarray(activation, dtype=float)
     n = values.shape[1]
-    if n < LEAST_SEGMENTS:
-        raise ValueError(f"a rhythm needs at least {LEAST_SEGMENTS} segments, not {n}")
     found, onsets, started = _onsets(times, values, SHORTEST_S)
     events, periods = _in_order(onsets), _intervals(onsets, started)
     judged = [of_segment[of_segment > started] for of_segment in onsets]
@@ -299,6 +294,8 @@ def score(time_s: ArrayLike, activation: ArrayLike, interval_s: float = DESIGN_I
         one = len(stuck) == 1
         named = f"segment{'' if one else 's'} {', '.join(map(str, stuck))} stay{'s' if one else ''}"
         verdict, reason = "silent", f"stalled: {named} contracted" if stuck else silence
+    elif n < LEAST_SEGMENTS:
+        verdict, reason = None, "one segment has no order"
     elif pair := next((i + 1 for i, of_pair in enumerate(cycle_lags) if any(len(lag) != 1 for lag in of_pair)), 0):
         verdict, reason = "disordered", f"segments {pair} and {pair % n + 1} do not take turns"
     elif min(map(len, onsets)) < 2 or min(map(len, lags)) < 1:

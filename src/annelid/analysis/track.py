@@ -10,28 +10,19 @@ from numpy.typing import ArrayLike
 
 from annelid.analysis.numbers import finite, number
 from annelid.errors import RunFileError
-from annelid.morphology import heading_turn
 from annelid.protocols import Array
 from annelid.simulation.runfile import Run
 
-# Where a worm leads in its own axes, seen from above.
-_FORWARDS = np.array([-1.0, 0.0])
+FORWARDS = np.array([-1.0, 0.0])
+"""Where a worm leads at the start, seen from above."""
 # An arc is one where it bulges by more than this many times what the points are off it.
 _CLEARLY = 3.0
 
 
-def first_heading(run: Run) -> Array:
-    """Returns the direction in which a run's worm leads at the start, seen from above, ``(2,)``."""
-    heading_deg = run.config.body.first_heading_deg
-    return heading_turn(heading_deg)[:2, :2] @ _FORWARDS if heading_deg else _FORWARDS
-
-
 def forward_position(run: Run) -> Array:
     """Returns the position of the centre of mass along the initial heading, m from the origin, ``(n_times,)``."""
-    ahead, centre = first_heading(run), run.data["center_of_mass"]
-    along: Array = ahead[0] * centre.sel(axis="x").values
-    # A planar worm moves along x alone.
-    return along + ahead[1] * centre.sel(axis="y").values if ahead[1] else along
+    along: Array = -run.data["center_of_mass"].sel(axis="x").values
+    return along
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,7 +12,7 @@ from annelid.lazy import lazy
 
 if TYPE_CHECKING:
     from annelid.arena.kinds.floor import Floor, Ground
-    from annelid.arena.mjcf import ROBOT, names_in, stated_in, validator
+    from annelid.arena.mjcf import ROBOT, names_in, stated_in, validator, with_attributes
     from annelid.arena.mjcf_files import read_mjcf
     from annelid.arena.surface import Implicit, Level, Plane, Surface
 
@@ -28,5 +28,6 @@ __all__ = [
     "read_mjcf",
     "stated_in",
     "validator",
+    "with_attributes",
 ]
 __getattr__, __dir__ = lazy(__name__, gone={"Nearest": "use Surface"})

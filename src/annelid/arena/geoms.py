@@ -50,7 +50,7 @@ def skin_geoms(spec: mujoco.MjSpec) -> list[mujoco.MjsGeom]:
 def add_moving_planes(spec: mujoco.MjSpec, arena: ArenaKind) -> None:
     """Adds to a worm's spec one plane on a mocap body for every geom that can touch the ground, and pairs the two."""
     options = contact_options(arena)
-    del options["friction"], options["priority"]
+    del options["friction"]
     for geom in skin_geoms(spec):
         name = f"ground_of_{geom.name}"
         holder = spec.worldbody.add_body(name=name, mocap=True)
@@ -159,8 +159,7 @@ def add_scene(spec: mujoco.MjSpec, text: str, depth_m: float) -> None:
         moves = alone.body_weldid[alone.geom_bodyid[alone.geom(geom.name).id]] > 0
         geom.rgba = POST_RGBA if moves else GROUND_RGBA
     for geom in skin_geoms(spec):
-        # Skin with a friction of its own keeps it.
-        geom.priority = geom.priority or -1
+        geom.priority = -1
     spec.attach(scene, prefix=SCENE, frame=spec.worldbody.add_frame(pos=[0.0, 0.0, -depth_m]))
     for name in floors:
         spec.geom(name).material = "floor"

@@ -13,8 +13,8 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from math import isfinite, prod
 
-from annelid.errors import ConfigError, shown
-from annelid.textfiles import parse_xml, tag_of
+from annelid.errors import ConfigError, shown, suggest
+from annelid.textfiles import line_of, parse_xml, tag_of
 
 MOST_BYTES = 4_000_000
 """Of a text, with all that its file took from others."""
@@ -131,7 +131,21 @@ def checked_tree(root: ET.Element, rules: Rules) -> str:
         raise ConfigError(f"has grids and textures of {grids:,.0f} samples: at most {MOST_SAMPLES:,} are read")
     if rules is SCENE:
         _name_objects(root)
+    _break_lines(root, 1)
     return ET.tostring(root, encoding="unicode")
+
+
+def _break_lines(parent: ET.Element, line: int) -> int:
+    """Puts each element into the line of its file, which the engine's errors then name; returns the last one."""
+    before = None
+    for child in parent:
+        gap = "\n" * max(line_of(child) - line, 0)
+        if before is None:
+            parent.text = gap
+        else:
+            before.tail = gap
+        line, before = _break_lines(child, line + len(gap)), child
+    return line
 
 
 def parsed(text: str | bytes, rules: Rules, *, included: bool = False) -> ET.Element:
@@ -166,16 +180,37 @@ def validator(rules: Rules) -> Callable[[str], str]:
     return valid
 
 
-def names_in(text: str, rules: Rules, section: str) -> tuple[str, ...]:
-    """Returns the names of the elements of a section (``actuator``) of a text that is `checked`, in its order.
+def names_in(text: str, rules: Rules, path: str) -> tuple[str, ...]:
+    """Returns the names of the elements at a path (``actuator/*``) of a text that is `checked`, in its order.
 
     Args:
         text: The text.
         rules: What it may contain.
-        section: Name of the section.
+        path: As in ElementTree.
+    """
+    return tuple(one.attrib["name"] for one in parsed(text, rules).iterfind(path) if "name" in one.attrib)
+
+
+def with_attributes(text: str, rules: Rules, attributes: Mapping[str, Mapping[str, Mapping[str, float | str]]]) -> str:
+    """Returns a text that is `checked` with other attributes of its elements, by tag, name and attribute.
+
+    Args:
+        text: The text.
+        rules: What it may contain.
+        attributes: The attributes.
+
+    Raises:
+        ConfigError: No element, or more than one, has such a tag and name, or the value is not allowed.
     """
     root = parsed(text, rules)
-    return tuple(element.attrib["name"] for element in root.iterfind(f"{section}/*") if "name" in element.attrib)
+    for tag, elements in attributes.items():
+        for name, values in elements.items():
+            found = [one for one in root.iter(tag) if one.get("name") == name]
+            if len(found) != 1:
+                there = [one.attrib["name"] for one in root.iter(tag) if "name" in one.attrib]
+                raise ConfigError(f"has {len(found)} <{tag}> named {shown(name)}: {suggest(name, there)}")
+            found[0].attrib.update({attribute: str(value) for attribute, value in values.items()})
+    return checked_tree(root, rules)
 
 
 def stated_in(text: str, rules: Rules, section: str, name: str) -> str | None:

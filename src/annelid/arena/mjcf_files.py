@@ -18,7 +18,7 @@ from annelid.arena.mjcf import MOST_BYTES, SCENE, Rules, checked, checked_tree, 
 from annelid.errors import ConfigError, shortened, shown
 from annelid.protocols import Array
 from annelid.text import is_line
-from annelid.textfiles import read_bytes, tag_of
+from annelid.textfiles import line_of, read_bytes, tag_of
 
 MOST_FILE_BYTES = 4_000_000
 """Of a mesh or a picture."""
@@ -74,6 +74,8 @@ def _include(root: ET.Element, beside: Path, rules: Rules, read: list[Path]) -> 
                 _include(content, beside, rules, read)
             except ConfigError as error:
                 raise ConfigError(f"{path.name}: {error}") from None
+            for element in content.iter():
+                vars(element)["line"] = line_of(child)  # That of the file that includes it.
             parent[place : place + 1] = list(content)
 
 

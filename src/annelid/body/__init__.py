@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from annelid.body.actuation import crossing_site, ring_names, stretch_sensors
     from annelid.body.actuators import ActuatorKind
     from annelid.body.actuators.muscle import Rings, muscle_force
-    from annelid.body.actuators.servo import ServoRings, motor_power_W, wrap_factors
-    from annelid.body.assemble import build_spec, compile_spec
+    from annelid.body.actuators.servo import ServoRings, wrap_factors
+    from annelid.body.assemble import build_spec, compile_robot, compile_spec, robot_spec
     from annelid.body.estimates import bearable_force_N, rhombus_of
     from annelid.body.formulations import FormulationKind
     from annelid.body.formulations.rods import Rods
@@ -38,12 +38,13 @@ __all__ = [
     "WormBody",
     "bearable_force_N",
     "build_spec",
+    "compile_robot",
     "compile_spec",
     "crossing_site",
-    "motor_power_W",
     "muscle_force",
     "rhombus_of",
     "ring_names",
+    "robot_spec",
     "stretch_sensors",
     "worm_of",
     "wrap_factors",

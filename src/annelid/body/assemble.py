@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import mujoco
 import numpy as np
 
-from annelid.arena.geoms import add_moving_planes, add_scenery, add_walls
+from annelid.arena.geoms import SCENE, add_moving_planes, add_scenery, add_walls
 from annelid.arena.ground import gravity_of
 from annelid.body.actuation import (
     add_joint_friction,
@@ -20,7 +21,7 @@ from annelid.body.actuation import (
 )
 from annelid.body.worm import worm_of
 from annelid.config import RunConfig
-from annelid.errors import ConfigError
+from annelid.errors import ConfigError, shortened
 
 MOST_ORDERED_BODIES = 8192
 """Above this the engine's solver does not order its unknowns (docs/evidence/sparse_ordering.md)."""
@@ -81,6 +82,46 @@ def build_spec(config: RunConfig, *, for_plant: bool = False) -> mujoco.MjSpec:
     return spec
 
 
+def robot_spec(config: RunConfig) -> mujoco.MjSpec:
+    """Returns the spec of a robot that a file describes, with the scene that is its arena, if any, and its gravity.
+
+    Raises:
+        ConfigError: The engine refuses the file or the scene.
+    """
+    assert config.body.own_model is not None
+    with _refused():
+        spec = mujoco.MjSpec.from_string(config.body.own_model.xml)
+    if config.arena is not None:
+        spec.option.gravity = gravity_of(config.arena)
+        config.arena.add_own(spec)
+        for geom in spec.geoms:
+            # The look of a worm's floor, which a robot's file need not have.
+            geom.material = "" if geom.name.startswith(SCENE) and geom.material == "floor" else geom.material
+    return spec
+
+
+def compile_robot(config: RunConfig) -> mujoco.MjModel:
+    """Compiles a robot that a file describes, with the step of its configuration.
+
+    Raises:
+        ConfigError: As `robot_spec`.
+    """
+    spec = robot_spec(config)
+    with _refused():
+        model = spec.compile()
+    model.opt.timestep = config.clock.physics_timestep_s
+    return model
+
+
+@contextmanager
+def _refused() -> Iterator[None]:
+    try:
+        yield
+    except (ValueError, mujoco.FatalError) as error:
+        reason = " ".join(str(error).split()).removeprefix("Error: ")
+        raise ConfigError(f"the engine refuses the robot: {shortened(reason, 200)}") from None
+
+
 def compile_spec(spec: mujoco.MjSpec) -> mujoco.MjModel:
     """Compiles a worm.
 
@@ -124,7 +165,7 @@ def mjcf_text(config: RunConfig, keyframes: Sequence[Mapping[str, Any]] = ()) ->
             refuses the model.
     """
     if config.body.own_model is not None:
-        return config.body.own_model.xml
+        return config.body.own_model.xml if config.arena is None else robot_spec(config).to_xml()
     if config.arena is not None and config.arena.has_setae:
         raise ConfigError(
             f"arena.backward_friction = {config.arena.backward_friction} cannot be written as MJCF, whose friction is "
@@ -135,11 +176,6 @@ def mjcf_text(config: RunConfig, keyframes: Sequence[Mapping[str, Any]] = ()) ->
         raise ConfigError(
             "body.strands: stiffness that differs along rods cannot be written as MJCF, where a rod has one: take "
             "body.formulation.kind = 'chain', or run the worm with annelid"
-        )
-    if body.heading_deg:
-        raise ConfigError(
-            f"body.heading_deg = {body.heading_deg:g} cannot be written as MJCF, whose keyframes lack the "
-            "frames of turned rods: set it to 0, or run the worm with annelid"
         )
     # The springs that annelid senses, by the names under which it drives a robot of one's own.
     for segment, springs in enumerate(stretch_sensors(body.geometry(), body.springs)):

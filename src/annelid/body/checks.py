@@ -6,8 +6,7 @@ Everything here follows from the configuration alone, in closed form, in under a
 from __future__ import annotations
 
 from collections.abc import Iterator
-from math import cos, degrees, hypot, pi, radians, tan
-from statistics import fmean
+from math import degrees, hypot, pi, radians, tan
 
 from annelid.body.estimates import WALKS_FROM, rhombus_of, soft_constraint
 from annelid.body.mesh import MeshBody
@@ -67,12 +66,15 @@ def material_findings(body: MeshBody) -> Iterator[Finding]:
         body.strands.one_number, ("young_modulus_Pa", "shear_modulus_Pa", "linear_density_kg_per_m")
     )
     area = pi * body.strands.radius_m**2
-    ratio = f"that is {shear / young:.2g} of the Young's modulus, where an isotropic material has 0.33 to 0.5"
+    ratio = (
+        f"that is {shear / young:.2g} of body.strands.young_modulus_Pa, where an isotropic material has 0.33 to 0.5: "
+        "both moduli change together"
+    )
     density = f"with this radius that is {line / area:.3g} kg/m^3"
     # Each with the bounds beyond which it is doubtful, and those to set it between.
     for field, value, problem, low, high, least, most in (
         ("young_modulus_Pa", young, "no strand is made of this", 1e6, 4e11, 1e6, 4e11),
-        ("shear_modulus_Pa", shear, ratio, 0.1 * young, young, young / 3, young / 2),
+        ("shear_modulus_Pa", shear, ratio, 0.25 * young, young, young / 3, young / 2),
         ("linear_density_kg_per_m", line, density, 50.0 * area, 25_000.0 * area, 500.0 * area, 2000.0 * area),
     ):
         if not low <= value <= high:
@@ -91,14 +93,13 @@ def ground_findings(config: RunConfig, body: MeshBody) -> Iterator[Finding]:
     if not arena.slope_rad:
         return
     # On ground that rises ahead the skin slides towards the rear.
-    rise = arena.slope_rad * cos(radians(body.heading_deg))
-    backward = rise > 1e-9 and arena.backward_friction is not None
+    backward = arena.slope_rad > 0.0 and arena.backward_friction is not None
     field, friction = ("backward_friction", arena.backward_friction) if backward else ("friction", arena.friction)
-    steepness, relative = tan(abs(arena.slope_rad)), fmean(body.relative_frictions)
-    if steepness >= relative * (friction or 0.0):
+    steepness = tan(abs(arena.slope_rad))
+    if steepness >= (friction or 0.0):
         problem = f"with arena.{field} = {friction:g} the worm slides down"
         slope_deg = round(degrees(arena.slope_rad), 9)
-        yield Finding("arena.slope_deg", slope_deg, problem, f"set arena.{field} above {steepness / relative:.2g}")
+        yield Finding("arena.slope_deg", slope_deg, problem, f"set arena.{field} above {steepness:.2g}")
 
 
 def tolerance_findings(

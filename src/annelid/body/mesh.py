@@ -14,7 +14,6 @@ from annelid.config.sections import Length, Modulus, NonNegative, PerSegmentOf, 
 from annelid.morphology import MeshGeometry, helical_mesh
 
 MOST_ELEMENTS = 32
-RelativeFriction = Annotated[float, Field(ge=0.01, le=100)]
 
 
 class Mesh(Section):
@@ -155,17 +154,6 @@ class Springs(Section):
 class MeshBody(BodyKind):
     """A 3D worm without its rings and its formulation, which ask it what they need."""
 
-    segment_fields: ClassVar[tuple[str, ...]] = ("relative_friction",)
-    heading_deg: Annotated[float, Field(ge=-360, le=360)] = Field(
-        default=0.0,
-        description="where the worm leads at the start, about its front end: 0 is towards -x, positive to its left "
-        "(90: towards -y)",
-    )
-    relative_friction: PerSegmentOf[RelativeFriction] | None = Field(
-        default=None,
-        description="friction of the skin over that of the arena, one number for all or one per segment: for the skin "
-        "nearest to its ring, midway between two rings the mean (not set: 1)",
-    )
     mesh: Mesh = Mesh()
     strands: Strands = Strands()
     pins: Pins = Pins()
@@ -199,11 +187,6 @@ class MeshBody(BodyKind):
         return tuple(knobs)
 
     @property
-    def first_heading_deg(self) -> float:
-        """As `heading_deg`."""
-        return self.heading_deg
-
-    @property
     def first_sensor(self) -> str:
         """Where the first stretch sensor of a segment lies."""
         return self.springs.first_sensor
@@ -212,9 +195,3 @@ class MeshBody(BodyKind):
     def elements(self) -> Elements:
         """Straight elements between neighbouring crossings."""
         return Elements("body.mesh.elements_per_side", self.mesh.elements_per_side, MOST_ELEMENTS)
-
-    @property
-    def relative_frictions(self) -> list[float]:
-        """Friction of every segment's skin over that of the arena."""
-        given = self.relative_friction is not None
-        return self.of_each("relative_friction", self.n_segments) if given else [1.0] * self.n_segments

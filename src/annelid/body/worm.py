@@ -113,7 +113,7 @@ class WormBody(MeshBody):
             that were not measured: other than rods with rigid crossings, with a damping time of 0.05 to 0.4 s, muscles
             all round that lag, springs that are at rest as drawn, and segments that are alike.
         """
-        if len(self.groups()) > 1 or self.relative_friction is not None:
+        if len(self.groups()) > 1:
             return None
         damping_s, rings, rate = self.strands.damping_time_s, self.rings, self.springs.one_number("stiffness_N_per_m")
         measured = self.has_rigid_crossings and rings.lags and not self.has_halves
@@ -169,7 +169,6 @@ class WormBody(MeshBody):
 
     def _fields_per_segment(self) -> Iterator[tuple[str, Section, str]]:
         """Yields every field that takes one number per segment: path and section that have it, and its name."""
-        yield from (("body", self, name) for name in self.segment_fields)
         for part in ALIKE_IN_A_GROUP:
             section: Section = getattr(self, part)
             yield from ((f"body.{part}", section, name) for name in section.segment_fields)
@@ -185,9 +184,9 @@ class WormBody(MeshBody):
         if time_s > LONGEST_BUILD_S:
             raise ValueError(
                 f"body.mesh.n_segments = {mesh.n_segments}, body.mesh.n_helices = {mesh.n_helices} and "
-                f"body.mesh.elements_per_side = {mesh.elements_per_side} make {elements:,} elements, which take about "
-                f"{time_s:,.0f} s and {memory_GB:,.1f} GB to build; at most {LONGEST_BUILD_S:g} s are allowed: lower "
-                "one of them"
+                f"body.mesh.elements_per_side = {mesh.elements_per_side} make {elements:,} elements. They take "
+                f"{time_s:,.0f} s and {memory_GB:,.1f} GB to build, and {LONGEST_BUILD_S:g} s are allowed: lower one "
+                "of them"
             )
         return self
 

@@ -22,8 +22,9 @@ def check(
     """Check before a run whether the numbers of a 3D worm fit together.
 
     It compares lengths with the ring at rest, forces with the strength of the mesh, the step with the stiffness, and
-    the tolerance of the sensors with the mesh. A finding says what is wrong and what to set instead. A run with an
-    error is refused. A run with a warning is doubtful; its file says so. The exit code is 2 if there is an error, else
+    the tolerance of the sensors with the mesh. It also builds worm and controller. A finding says what is wrong and
+    what to set instead. A run with an error is refused. A run with a warning is doubtful; its file says so. What only
+    the motion shows, such as a slack cable, is in the table of the run. The exit code is 2 if there is an error, else
     0.
 
     \b
@@ -31,8 +32,12 @@ def check(
     annelid check my.toml --json
     """
     from annelid.plausibility import check as findings_of
+    from annelid.simulation import build_controller, build_plant
 
-    found = findings_of(config_of(preset, overrides_of(assignments), segments, fidelity, arena))
+    config = config_of(preset, overrides_of(assignments), segments, fidelity, arena)
+    found = findings_of(config)
+    if not any(finding.severity == "error" for finding in found):
+        build_controller(config, build_plant(config))
     if not give([asdict(finding) for finding in found]):
         typer.echo("\n".join(f"{finding.severity}: {finding}" for finding in found) or "nothing found")
     if any(finding.severity == "error" for finding in found):

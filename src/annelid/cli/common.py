@@ -95,15 +95,6 @@ ArenaName = Annotated[
 Jobs = Annotated[
     int | None, typer.Option(min=1, max=4096, help="Runs at a time.  [default: as many as there are cores]")
 ]
-SchedulerAddress = Annotated[
-    str | None,
-    typer.Option(
-        metavar="ADDRESS",
-        help="Compute the runs on the workers of this Dask scheduler: tcp://HOST:PORT, tls://HOST:PORT, or its"
-        " scheduler file (.json). It can run code in your name, so you must trust it"
-        "  [default: processes of this machine]",
-    ),
-]
 Output = Annotated[Path, typer.Option("--output", "-o", help="Folder of the results and the runs.")]
 ResultsFolder = Annotated[Path, typer.Option("--output", "-o", help="Folder of the results.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no tables, only the paths.")]
@@ -115,7 +106,7 @@ Force = Annotated[bool, typer.Option("--force", help="Replace an output file tha
 
 
 @contextmanager
-def kept_runs(output: Path, *, jobs: int | None, quiet: bool, scheduler: str | None = None) -> Iterator[Store]:
+def kept_runs(output: Path, *, jobs: int | None, quiet: bool) -> Iterator[Store]:
     """Gives the store of a study's runs, ``runs`` in its folder, with its workers and its progress display.
 
     Other writers are kept out of the folder.
@@ -123,21 +114,14 @@ def kept_runs(output: Path, *, jobs: int | None, quiet: bool, scheduler: str | N
     Args:
         output: Folder of the study's results.
         jobs: Runs at a time, or None.
-        scheduler: Address of a Dask scheduler whose workers compute; None for processes of this machine.
         quiet: Whether progress is not shown.
-
-    Raises:
-        BadParameter: Both a scheduler and ``jobs`` are given.
     """
-    from annelid.experiment import executors
+    from annelid.experiment.executors import Processes
     from annelid.experiment.progress import study_progress
     from annelid.experiment.store import Store
 
-    if scheduler is not None and jobs is not None:
-        raise typer.BadParameter("--jobs is for processes of this machine: leave it out with --scheduler")
     lock(output)
-    workers = executors.workers(None, jobs) if scheduler is None else executors.scheduler(scheduler)
-    with going_on(output / "runs"), workers as executor, study_progress(quiet=quiet) as progress:
+    with going_on(output / "runs"), Processes(jobs) as executor, study_progress(quiet=quiet) as progress:
         yield Store(output / "runs", executor, progress=progress)
 
 
@@ -203,10 +187,26 @@ def config_of(
     if segments is not None:
         overrides |= {load_config(source).body.segments_field: segments}
     config = load_config(source, overrides, fidelity=fidelity, arena=arena)
+    _say_unchanged(config, overrides, source, fidelity, arena)
     if preset is None and refitting:
         fitted = f"{FIRST_PRESET} is fitted to three segments, its mesh and its step"
         complain(f"{refitting[0]} without a preset takes {RIGID_PRESET}: {fitted}")
     return config
+
+
+def _say_unchanged(config: RunConfig, overrides: Mapping[str, Any], source: str, *options: str | None) -> None:
+    """Says which fields were set to the value that they have without it."""
+    from annelid.config import field_value, fields_of, load_config, toml_value, whole_path
+
+    if not overrides:
+        return
+    fidelity, arena = options
+    without = load_config(source, fidelity=fidelity, arena=arena)
+    for path in (whole_path(given, config.model_dump()) for given in overrides):
+        if path in fields_of(config) and path in fields_of(without):
+            value = field_value(config, path)
+            if value == field_value(without, path):
+                complain(f"note: {path} = {toml_value(value)} changes nothing: {source} has this value")
 
 
 def names_worm(source: str) -> bool:

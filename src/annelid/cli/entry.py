@@ -150,13 +150,6 @@ class Command(TyperCommand):
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Reads the options, and refuses infinite ones and those that are not a number."""
         _typed.set((*ctx.command_path.split()[1:], *args))
-        takes_scheduler = any("--scheduler" in one.opts for one in self.params)
-        if takes_scheduler and ("ANNELID_CLUSTER" in os.environ or any(word.startswith("--cluster") for word in args)):
-            raise typer.BadParameter(
-                "--cluster and ANNELID_CLUSTER are no more: leave them out for processes of this machine, give a Dask "
-                "scheduler's address to --scheduler, and see docs/sweeps.md for Slurm",
-                ctx=ctx,
-            )
         rest = super().parse_args(ctx, args)
         for parameter in self.params:
             value = ctx.params.get(parameter.name)

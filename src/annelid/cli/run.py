@@ -37,6 +37,13 @@ def run_command(
     segments: Segments = None,
     fidelity: FidelityLevel = None,
     arena: ArenaName = None,
+    network: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.toml",
+            help="A network of your own as the controller; annelid export-network PRESET --to toml writes one.",
+        ),
+    ] = None,
     duration: Annotated[float | None, typer.Option(help="Simulated time, s.")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of every random draw.")] = None,
     out: Annotated[
@@ -119,6 +126,7 @@ def run_command(
     from annelid.plausibility import refuse_nonsense
     from annelid.simulation.loop import simulate
     from annelid.simulation.runfile import FILE_NAME, open_run
+    from annelid.textfiles import read_text
 
     if uncertainty is None and (uncertainty_from, vary) != (None, None):
         raise typer.BadParameter("--uncertainty-from and --vary need --uncertainty N")
@@ -132,12 +140,16 @@ def run_command(
         )
 
     overrides = overrides_of(assignments, duration_s=duration, seed=seed)
+    if network is not None:
+        overrides |= {"controller.kind": "network", "controller.text": read_text(network, "the network")}
     if resume is None:
         config = config_of(preset, overrides, segments, fidelity, arena, uncertainty)
-    elif (preset, segments, fidelity, arena) == (None, None, None, None):
+    elif (preset, segments, fidelity, arena, network) == (None,) * 5:
         config = load_config(open_run(resume).config.model_dump(), overrides)
     else:
-        raise typer.BadParameter("--resume continues a run as it is: give no preset, --segments, --fidelity or --arena")
+        raise typer.BadParameter(
+            "--resume continues a run as it is: give no preset, --segments, --fidelity, --arena, --network"
+        )
     for doubt in refuse_nonsense(config):
         complain(f"warning: {doubt}")
     folder = locked_folder(out, config.name)

@@ -215,7 +215,7 @@ def export_command(
             autocompletion=worms_from,
         ),
     ],
-    to: Annotated[str, typer.Option(metavar="FORMAT", help="csv, mat, parquet, nwb, html or mjcf.")],
+    to: Annotated[str, typer.Option(metavar="FORMAT", help="csv, mat, parquet, nwb, wcon, html or mjcf.")],
     output: Annotated[
         Path | None,
         typer.Option("--output", "-o", help="File to write, or folder of csv and parquet  [default: in the run]"),
@@ -230,7 +230,7 @@ def export_command(
             min=1,
             max=10_000_000,
             metavar="N",
-            help="Only every Nth sample, and every Nth frame (csv, mat, parquet, nwb).",
+            help="Only every Nth sample, and every Nth frame (csv, mat, parquet, nwb, wcon).",
         ),
     ] = None,
     from_time: Annotated[float | None, typer.Option(metavar="SECONDS", help="From this time on, s (not mjcf).")] = None,
@@ -252,6 +252,7 @@ def export_command(
     parquet  the tables of csv, units in the metadata
     nwb      Neurodata Without Borders: potentials as intracellular series,
              with behaviour and positions
+    wcon     JSON of worm trackers: the centre line over time, seen from above
     html     one page that needs no other file: numbers, figures,
              configuration, what to cite
     mjcf     the model for plain MuJoCo, with the last state as a keyframe;

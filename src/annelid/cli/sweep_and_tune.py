@@ -14,7 +14,6 @@ from annelid.cli.common import (
     NamedPreset,
     Output,
     Quiet,
-    SchedulerAddress,
     kept_runs,
     overrides_of,
     print_results,
@@ -27,17 +26,10 @@ from annelid.cli.json_output import refuse_json
 def sweep_command(
     study: Annotated[Path | None, typer.Argument(metavar="STUDY.toml", help="The study; --example prints one.")] = None,
     output: Output = Path("sweep"),
-    scheduler: SchedulerAddress = None,
     jobs: Jobs = None,
     samples: Annotated[
         int | None, typer.Option(min=1, max=1_000_000, help="Samples to draw.  [default: as the study has it]")
     ] = None,
-    check: Annotated[
-        int,
-        typer.Option(
-            min=0, max=1_000_000, metavar="N", help="Runs to repeat at half the step and with one more element."
-        ),
-    ] = 0,
     example: Annotated[
         bool, typer.Option("--example", help="Print a study with comments, as a start for your own.")
     ] = False,
@@ -50,19 +42,13 @@ def sweep_command(
 
     Writes sweep.nc, one labelled dataset with all numbers; sweep.csv, one row per run; sweep.png and .svg. Runs are
     kept. A second call computes only what is missing or has failed, and one with more samples adds to them. A run that
-    cannot be built, or whose workers die repeatedly, is listed with its reason, and the sweep goes on. Several machines
-    need pip install "annelid[sweep]"; docs/sweeps.md describes them, and Slurm.
-
-    --check N repeats N complete runs, spread evenly over the sweep, at half the step and with one more element per
-    side. A sentence at the end names those that are not resolved. The column check of sweep.csv says what moves, and
-    what to try.
+    cannot be built, or whose workers die repeatedly, is listed with its reason, and the sweep goes on. For several
+    machines, docs/sweeps.md has recipes in Python.
 
     \b
     annelid sweep --example > study.toml
     annelid sweep study.toml
-    annelid sweep study.toml --scheduler tcp://10.0.0.1:8786
     annelid sweep study.toml --samples 512
-    annelid sweep study.toml --check 4      do step and mesh change its results?
     """
     refuse_json(example, "--example")
     if example:
@@ -73,16 +59,14 @@ def sweep_command(
     if study is None:
         raise typer.BadParameter("name a study: annelid sweep --example > study.toml  makes one to begin with")
     from annelid.config import load_study
-    from annelid.experiment.sweep import checked_sentence, results_table, swept, write_results
+    from annelid.experiment.sweep import results_table, swept, write_results
 
     loaded = load_study(study)
     if samples is not None:
         loaded = load_study(loaded.model_dump(by_alias=True) | {"samples": samples})
-    with kept_runs(output, jobs=jobs, scheduler=scheduler, quiet=quiet) as store:
-        done = swept(loaded, output, executor=store.executor, check=check, progress=store.progress)
-    sentences = [checked_sentence(done)] if check else []
-    results = {"check": {i: one.to_dict() for i, one in done.checks.items()}} if check else {}
-    print_results(write_results(done), results_table(done), *sentences, quiet=quiet, results=results)
+    with kept_runs(output, jobs=jobs, quiet=quiet) as store:
+        done = swept(loaded, output, executor=store.executor, progress=store.progress)
+    print_results(write_results(done), results_table(done), quiet=quiet)
     failed, stopped = (sum(run.status == status for run in done.runs) for status in ("failed", "stopped"))
     end_study(len(done.runs), failed, output / "sweep.csv", stopped=stopped)
 
@@ -119,7 +103,6 @@ def tune_command(
         ),
     ] = None,
     jobs: Jobs = None,
-    scheduler: SchedulerAddress = None,
     quiet: Quiet = False,
 ) -> None:
     """Search for a faster, cheaper or less slipping gait.
@@ -149,7 +132,7 @@ def tune_command(
     task = tune.Task(preset, changes, tune.parsed_variables(vary or [], base), objectives, trials, seed, numerics)
     found: list[tune.Trial] = []
     written: list[Path] = []
-    with kept_runs(output, jobs=jobs, scheduler=scheduler, quiet=quiet) as store:
+    with kept_runs(output, jobs=jobs, quiet=quiet) as store:
         for generation in tune.search(task, store):
             found += generation
             written = tune.write_results(task, found, typed_command(), output)

@@ -6,7 +6,8 @@ import re
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from difflib import get_close_matches
-from functools import reduce
+from functools import cache, reduce
+from importlib import resources
 from typing import Any, TypeVar, get_origin
 
 from pydantic import BaseModel, ValidationError
@@ -16,6 +17,7 @@ from annelid.config.kinds import Kind, kinds_of
 from annelid.config.run import RunConfig
 from annelid.config.sections import Section
 from annelid.errors import MOST_SHOWN, ConfigError, listed, nearest, shown
+from annelid.textfiles import parse_toml
 
 Checked = TypeVar("Checked", bound=Section)
 
@@ -105,94 +107,16 @@ _SYMBOLS = {"Nms": "N m s", "Nm": "N m", "Ns": "N s", "m2": "m²", "s2": "s²", 
 
 RENAMED = {"controller.let_go_s": "controller.motor_time_constant_s"}
 """Fields that go on under another name, by dotted path."""
-_LOADS = ("'sns-pressure' has the loads of the six-segment robot", "'sns-pressure' has the lengths of the same robot")
-_SOLVER = "the solver's limits are constants of the formulation"
-_TOUCH = "'touch' is the published rule"
-_FAULTS = "the faults are lost sensors, a weak segment and a pull"
-_ROBUST = {
-    "capacitance_nF": 5.0,
-    "leak_conductance_uS": 1.0,
-    "range_mV": 20.0,
-    "bifurcation_mV": -1.0,
-    "offset_mV": 0.1,
-    "inhibitory_reversal_mV": -40.0,
-    "excitatory_reversal_mV": 194.0,
-    "sodium_reversal_mV": 110.0,
-    "gate_slope_per_mV": 0.05,
-    "gate_time_constant_ms": 300.0,
-    "push_nA": 6.0,
-    "entrainment": 0.02,
-    "habit_ms": 10000.0,
-    "full_stretch_m": 0.08,
-    "scheme": "euler",
-}
-GONE: Mapping[str, tuple[str, Any]] = {
-    "body.formulation.curvature": ("a strand's curvature is always linear between two crossings", "linear"),
-    "body.formulation.integrator": (
-        "rods always take second-order steps (BDF2), a chain those of Runge and Kutta",
-        ("BDF2", "RK4"),
-    ),
-    "body.formulation.joint": ("a chain's elements are always joined by three hinges", "hinges"),
-    "body.formulation.pins": ("a chain's strands are always tied to a pin between them", "separate"),
-    "body.formulation.pin_inertance_kg": ("pins are tied by springs and dashpots alone", 0),
-    "body.formulation.lateral_damping_Nms_per_rad": (
-        "set body.strands.damping_time_s, which damps every direction",
-        0,
-    ),
-    "body.strands.joint_damping_Nms_per_rad": (
-        "set body.strands.damping_time_s, a joint's damping over its stiffness",
-        0,
-    ),
-    "body.strands.loss_factor": (
-        "set body.strands.damping_time_s to the loss factor over 2 pi times its frequency",
-        0,
-    ),
-    "body.strands.loss_frequency_Hz": ("set body.strands.damping_time_s, as for loss_factor", None),
-    "body.strands.relative_stiffness": (
-        "all strands are alike; segments may differ (body.strands.young_modulus_Pa)",
-        None,
-    ),
-    "arena.rail_gap_m": ("guard rails stand on arena.kind = 'floor' only", None),
-    "arena.posts": ("posts stand on arena.kind = 'floor' only", []),
-    "arena.friction_cone": ("rods always have elliptic cones, and a chain pyramidal ones", ()),
-    "body.formulation.solver_iterations": (_SOLVER, (300, 500)),
-    "body.formulation.solver_tolerance": (_SOLVER, (1e-6, 1e-8)),
-    "guard.pin_gap_m": ("the two strands of a crossing may always part by 15 cm", 0.15),
-    "guard.ring_closure": ("a ring may always be as short as its crossings are wide", 1.0),
-    "guard.stretch": ("an axial spring may always be 1.1 times as long as the straight strands beside it", 1.1),
-    "controller.landing": ("it saved nothing (sns-pressure)", 0),
-    "controller.drive_slope_per_s": ("a drive is constant during a run", 0),
-    "controller.stretch_gain_per_m": ("a drive is constant during a run", 0),
-    "controller.drive_time_constant_s": ("the descending neuron of 'adaptive' has 0.05 s", 0.05),
-    "controller.light_N": (_LOADS[0], 2.5),
-    "controller.full_N": (_LOADS[0], 9.0),
-    "controller.extending_m": (_LOADS[1], 0.045),
-    "controller.extended_m": (_LOADS[1], 0.055),
-    "controller.pressure_time_constant_s": ("the pressure neurons of 'sns-pressure' have 0.03 s", 0.03),
-    "controller.limbs": ("'phase-chain' has no limbs", False),
-    "controller.feedback": ("'shc' always waits for the stretch of its segments", "stretch"),
-    "controller.contact_cue_N": ("'shc' always waits for the stretch of its segments", 0.2),
-    "controller.coupling_per_s": ("'phase-chain' has the salamander's coupling", 10.0),
-    "trial.loss_s": ("a loss lasts 0.2 s", 0.2),
-    **dict.fromkeys(
-        (f"trial.{name}" for name in ("drift_m_per_s", "resolution_m", "delay_s", "backlash", "push_N", "push_from_s")),
-        (_FAULTS, 0.0),
-    ),
-    "trial.push_s": (_FAULTS, 0.5),
-    "trial.silent_s": (_FAULTS, 0.0),
-    "trial.random_s": (_FAULTS, 0.0),
-    "turning.arm_N": (_TOUCH, 2.0),
-    "turning.hold_s": (_TOUCH, 6.0),
-    "turning.least_N": (_TOUCH, 1.0),
-    "turning.full_N": (_TOUCH, 15.0),
-    "turning.rate_per_s": (_TOUCH, 10.0),
-    **{
-        f"controller.{name}": ("a constant of annelid.nervous.robust for 'sns-robust'", value)
-        for name, value in _ROBUST.items()
-    },
-}
-"""Fields that are gone, by dotted path: what replaced each, and the value or values with which it did nothing, beside
-None."""
+
+
+@cache
+def gone_fields() -> Mapping[str, dict[str, Any]]:
+    """Returns what ``data/gone_fields.toml`` has of each field that is gone, by dotted path.
+
+    ``now`` is what replaced it, ``idle`` the values with which it did nothing, beside None.
+    """
+    file = resources.files("annelid") / "data" / "gone_fields.toml"
+    return parse_toml(file.read_text(encoding="utf-8"), file.name)
 
 
 def present_fields(tree: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -206,13 +130,13 @@ def present_fields(tree: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, A
         acted, which it still has, with their values, by dotted path.
     """
     present, acted = dict(tree), dict[str, Any]()
-    for path in (*RENAMED, *GONE):
+    for path in (*RENAMED, *gone_fields()):
         *above, leaf = path.split(".")
         section = reduce(lambda part, name: part.get(name) if isinstance(part, Mapping) else None, above, tree)
         if not isinstance(section, Mapping) or leaf not in section or has_field(path, tree):
             continue
         value = section[leaf]
-        if path in GONE and not _did_nothing(path, value, tree):
+        if path not in RENAMED and not _did_nothing(path, value, tree):
             acted[path] = value
             continue
         section = present
@@ -226,15 +150,15 @@ def present_fields(tree: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, A
 
 def _did_nothing(path: str, value: Any, tree: Mapping[str, Any]) -> bool:
     """Whether a field that is gone had a value that its worm has without it."""
-    idle = GONE[path][1]
+    idle = gone_fields()[path]["idle"]
     body = tree.get("body")
     formulation = body.get("formulation") if isinstance(body, Mapping) else None
     formulation = formulation if isinstance(formulation, Mapping) else {}
     if path == "body.formulation.pin_inertance_kg" and formulation.get("pins") != "separate":
         return True
     if path == "arena.friction_cone":
-        idle = "pyramidal" if formulation.get("kind") == "chain" else "elliptic"
-    return value in (*(idle if isinstance(idle, tuple) else (idle,)), None, "none")
+        idle = ["pyramidal" if formulation.get("kind") == "chain" else "elliptic"]
+    return value in (*idle, None, "none")
 
 
 def has_field(path: str, tree: Mapping[str, Any]) -> bool:
@@ -354,8 +278,8 @@ def _explain(detail: ErrorDetails, root: type[Section], tree: Any) -> str:
         path = ".".join([*parts, unknown])
         # What is gone from one kind may be a field of another.
         elsewhere = path.startswith("controller.") and path in field_paths()
-        if path in GONE and root is RunConfig and not elsewhere:
-            return f"{path} is no field any more: {GONE[path][0]}; leave it out"
+        if path in gone_fields() and root is RunConfig and not elsewhere:
+            return f"{path} is no field any more: {gone_fields()[path]['now']}; leave it out"
         return f"unknown field {shown(path)}: {_nearest_fields(unknown, parts, section, root)}"
     path = ".".join(parts)
     if kind == "missing":

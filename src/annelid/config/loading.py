@@ -21,6 +21,11 @@ from annelid.textfiles import MOST_LEVELS, check_depth, parse_toml, read_text, r
 DEFAULT_BASE = "riddle2023-rods"
 """What a user's file starts from unless it says otherwise or states its own kind of body."""
 
+_FOREIGN = {
+    ".urdf": "; load URDF in MuJoCo and save it as MJCF",
+    ".nml": "; write a network of NeuroML as TOML (annelid export-network PRESET --to toml shows the form)",
+}
+"""What to do with files of other programs, by their ends."""
 _packages = ["annelid"]
 """Packages that have presets and arenas."""
 
@@ -90,7 +95,10 @@ def _files(folder: str) -> dict[str, Traversable]:
 def _text(folder: str, what: str, name: str) -> str:
     files = _files(folder)
     if name not in files and Path(name).suffix and isfile(name):
-        raise ConfigError(f"{name} is no configuration: a file ends in .toml, a robot or a scene as MJCF in .xml")
+        remedy = _FOREIGN.get(Path(name).suffix.lower(), "")
+        raise ConfigError(
+            f"{name} is no configuration: a file ends in .toml, a robot or a scene as MJCF in .xml{remedy}"
+        )
     if name not in files:
         raise ConfigError(f"unknown {what} {shown(name)}: {suggest(name, files)}")
     return files[name].read_text(encoding="utf-8")

@@ -181,11 +181,6 @@ class BodyKind(Kind):
         )
 
     @property
-    def first_heading_deg(self) -> float:
-        """Where it leads at the start: 0 is towards -x, positive to its left."""
-        return 0.0
-
-    @property
     def first_sensor(self) -> str:
         """Where the first of a segment's stretch sensors lies, in words; empty where there is but one."""
         return ""

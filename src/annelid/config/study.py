@@ -11,13 +11,10 @@ from pydantic import Field, model_validator
 from annelid.config.checking import check_section
 from annelid.config.loading import seen_from
 from annelid.config.sections import Line, Section, Seed
-from annelid.errors import ConfigError, shown
 from annelid.textfiles import check_depth, read_toml
 
 Design = Literal["grid", "random", "lhs", "sobol"]
 MOST_RUNS = 100_000
-INSTEAD = "leave it out, and give --scheduler ADDRESS, or executor= in Python; docs/sweeps.md has Slurm"
-"""What replaced clusters that a study describes."""
 HOW = "give values = [..], choices = [..], or from, to and, in a grid, number"
 
 
@@ -33,6 +30,9 @@ class Vary(Section):
     number: Annotated[int, Field(ge=2, le=MOST_RUNS)] | None = Field(
         default=None, description="values of a range that a grid takes, both ends among them"
     )
+    follow: Mapping[str, float] = Field(
+        default_factory=dict, description="other fields, each with the ratio to this one that it keeps"
+    )
 
     @model_validator(mode="after")
     def _says_one_thing(self) -> Self:
@@ -40,6 +40,8 @@ class Vary(Section):
         ways = sum((self.values is not None, self.choices is not None, is_range))
         if ways != 1:
             raise ValueError(f"vary {self.field!r} says {'nothing' if not ways else 'two things'} to take: {HOW}")
+        if self.follow and self.choices is not None:
+            raise ValueError(f"vary {self.field!r}: follow needs numbers, values = [..] or from and to, not choices")
         listed = self.values if self.values is not None else self.choices
         if listed is not None:
             if self.log or self.number is not None:
@@ -116,6 +118,4 @@ def load_study(source: str | Path | Mapping[str, Any] | Study) -> Study:
         tree = {"name": Path(source).stem, **read_toml(Path(source), "the study")}
         if isinstance(preset := tree.get("preset"), str):
             tree["preset"] = seen_from(Path(source).parent, preset)
-    if "cluster" in tree:
-        raise ConfigError(f"cluster = {shown(tree['cluster'])}: a study names no cluster any more: {INSTEAD}")
     return check_section(Study, tree)

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import Annotated, ClassVar, Generic, TypeVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import Field
 
-from annelid.config.sections import Section
+from annelid.config.run import ControllerKind, RunConfig
 from annelid.errors import ConfigError
 from annelid.protocols import (
     Array,
     Controller,
+    Plant,
     Recordable,
     Records,
     SavedAndRecorded,
@@ -27,7 +28,6 @@ from annelid.protocols import (
 
 Slope = Annotated[float, Field(ge=-100, le=100)]
 TimeConstant = Annotated[float, Field(ge=1e-3, le=1e4)]
-Pattern = TypeVar("Pattern", bound=Section)
 
 
 class SegmentController(SavedAndRecorded, ABC):
@@ -85,34 +85,52 @@ class SegmentController(SavedAndRecorded, ABC):
         return Recordable(own.signals, own.coords, {"controller": self.name, **own.attrs})
 
 
-class OpenLoopController(SegmentController, Generic[Pattern]):
-    """Contracts segments by the clock: during the step from t to t + dt as its pattern says for t; has no state.
+class OpenLoopKind(ControllerKind):
+    """Base of the sections of open-loop controllers: they say what each segment does when, and nothing else.
 
     Attributes:
-        pattern: Its section of the configuration.
+        title: What the run file calls the controller.
     """
 
-    def __init__(self, pattern: Pattern, n_segments: int, n_muscles: int) -> None:
-        """Takes a pattern and the size of the worm.
+    title: ClassVar[str]
+
+    @abstractmethod
+    def activation(self, time_s: ArrayLike, n_segments: int) -> Array:
+        """Returns the activation of every segment at times.
+
+        Args:
+            time_s: Simulated times, s, any shape.
+            n_segments: Segments.
+
+        Returns:
+            Activation in [0, 1], ``(*time_s.shape, n_segments)``.
+        """
+
+    def build(self, config: RunConfig, plant: Plant) -> OpenLoopController:
+        """Builds the controller, as `ControllerKind.build`."""
+        return OpenLoopController(self, plant.n_segments, plant.n_muscles)
+
+
+class OpenLoopController(SegmentController):
+    """Contracts segments by the clock: during the step from t to t + dt as its section says for t; has no state."""
+
+    def __init__(self, pattern: OpenLoopKind, n_segments: int, n_muscles: int) -> None:
+        """Takes a section and the size of the worm.
 
         Args:
             pattern: Its section of the configuration.
             n_segments: Segments.
             n_muscles: As `SegmentController`.
         """
-        self.pattern = pattern
+        self.pattern, self.name = pattern, pattern.title
         super().__init__(n_segments, n_muscles)
-
-    @abstractmethod
-    def activation(self, time_s: float) -> Array:
-        """Returns the activation of every segment at a time, in [0, 1], ``(n_segments,)``."""
 
     def reset(self, seed: int) -> None:
         """Does nothing: there is no state, and nothing is random."""
 
     def step(self, sensation: Sensation) -> Array:
         """Returns the activation of the step that begins now; nothing but the time is sensed."""
-        return self.activation(sensation.time_s).repeat(self.muscles_per_segment)
+        return self.pattern.activation(sensation.time_s, self.n_segments).repeat(self.muscles_per_segment)
 
 
 class WrappedController(ABC):
@@ -200,31 +218,17 @@ class CallableController:
         """Does nothing: what keeps a state is a class of its own."""
 
     def step(self, sensation: Sensation) -> Array:
-        """Calls the function and checks what it returns.
+        """Calls the function; whoever steps a controller checks what it gives.
 
         Raises:
-            ConfigError: The activation is no number, has another shape, or leaves [0, 1].
+            ConfigError: The activation is no number.
         """
-        result, n, time_s = self._function(sensation), self._n_muscles, sensation.time_s
+        result = self._function(sensation)
         try:
             activation = np.array(result, dtype=np.float64)
         except (TypeError, ValueError):
             raise ConfigError(
-                f"the controller function returned {type(result).__name__} at {time_s:g} s; it must return {n} numbers "
-                "in [0, 1]"
+                f"the controller function returned {type(result).__name__} at {sensation.time_s:g} s; it must return "
+                f"{self._n_muscles} numbers in [0, 1]"
             ) from None
-        if activation.ndim == 0:
-            activation = np.full(n, activation)
-        if activation.shape != (n,):
-            raise ConfigError(
-                f"the controller function returned shape {activation.shape} at {time_s:g} s; it must return shape "
-                f"({n},)"
-            )
-        within = (activation >= 0.0) & (activation <= 1.0)
-        if not within.all():
-            worst = int(np.argmin(within))
-            raise ConfigError(
-                f"the controller function returned activation {activation[worst]:g} for muscle {worst + 1} at "
-                f"{time_s:g} s; it must lie in [0, 1]"
-            )
-        return activation
+        return activation if activation.ndim else np.full(self._n_muscles, activation)

@@ -44,7 +44,7 @@ class CircuitController(SegmentController):
             "sodium_gate",
             ("neuron",),
             "1",
-            "inactivation gate h of the persistent sodium channel; NaN for neurons without one",
+            "slow gate, h of the persistent sodium channel; NaN for neurons without one",
         ),
         (
             "sensor_on",

@@ -15,6 +15,8 @@ from annelid.control.circuit_controller import CircuitKind
 from annelid.control.senses import Pulse, Source, Switch
 from annelid.nervous import Network, PeristalsisParameters, peristalsis
 
+NAME = "synthetic nervous system"
+"""What the run file calls the paper's controller."""
 DRIVE_HINT = "Descending drive: more of it makes the wave faster."
 
 
@@ -72,7 +74,7 @@ class Sns(CircuitKind):
         design = self.design
         network = peristalsis.peristalsis_network(n_segments, design)
         constants = {f"conductance_{name}_uS": value for name, value in asdict(design.conductances).items()}
-        return self.gated(network, config, n_segments, "synthetic nervous system", constants=constants)
+        return self.gated(network, config, n_segments, NAME, constants=constants)
 
     def gated(
         self,

@@ -162,8 +162,8 @@ class CourseTurning(Steered):
     kind: Literal["course"] = "course"
     waypoints: tuple[Waypoint, ...] = Field(
         min_length=1,
-        description="x and y of each, m, in the coordinates of the run file: a worm with body.heading_deg = 0 starts "
-        "along 0 <= x <= its length, leads towards -x, and its left is -y",
+        description="x and y of each, m, in the coordinates of the run file: the worm starts along "
+        "0 <= x <= its length, leads towards -x, and its left is -y",
     )
     reach_m: Positive = Field(default=0.3, description="a waypoint counts once the foremost ring is this near to it")
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from annelid.draw.canvas import plain, save
     from annelid.draw.drawn_worm import CONTRACTED_WIDTH, SPRING_RGBA
     from annelid.draw.figures import RUN_FIGURES
-    from annelid.draw.figures.comparison import lengths_figure, potentials_figure, travel_figure
+    from annelid.draw.figures.comparison import lengths_figure, travel_figure
     from annelid.draw.figures.experiments import progress_figure, uncertainty_figure
     from annelid.draw.figures.network_diagram import network_figure
     from annelid.draw.gl import find_backend
@@ -69,7 +69,6 @@ __all__ = [
     "plain",
     "plot_path",
     "postures_of",
-    "potentials_figure",
     "progress_figure",
     "render_frame",
     "render_still",

@@ -23,16 +23,15 @@ FIELD_OF_VIEW_DEG = 30.0
 MARGIN = 0.84  # share of the picture that the worm may fill: 8 % stay free on each side
 
 
-def view_angles(name: str, heading_deg: float = 0.0) -> tuple[float, float]:
-    """Returns azimuth and elevation of a named view, degrees; all but the fixed ones turn with the initial heading.
+def view_angles(name: str) -> tuple[float, float]:
+    """Returns azimuth and elevation of a named view, degrees.
 
     Raises:
         RunFileError: No view has that name.
     """
     if name not in VIEWS_DEG:
         raise RunFileError(f"unknown camera {name!r}: {suggest(name, VIEWS_DEG)}")
-    azimuth, elevation = VIEWS_DEG[name]
-    return (azimuth if name in FIXED else azimuth + heading_deg), elevation
+    return VIEWS_DEG[name]
 
 
 def fitting_distance(offsets_m: ArrayLike, azimuth_deg: float, elevation_deg: float, aspect: float) -> float:

@@ -12,7 +12,6 @@ import subprocess
 from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, requires, version
-from importlib.util import find_spec
 
 from annelid.draw.gl import UNSET, candidates, find_backend, works
 from annelid.engine import REMEDY, mixed_engine
@@ -95,18 +94,14 @@ def _back_ends() -> Iterator[Finding]:
 
 def _ffmpeg() -> Finding:
     remedy = "unset IMAGEIO_FFMPEG_EXE" if os.environ.get("IMAGEIO_FFMPEG_EXE") else "pip install imageio-ffmpeg"
-    if find_spec("imageio_ffmpeg") is None:
-        return Finding("ffmpeg", False, "not installed", remedy)
-    import imageio_ffmpeg
-
     try:
-        if found := imageio_ffmpeg.get_ffmpeg_version():
-            return Finding("ffmpeg", True, found)
-    except (RuntimeError, OSError):
-        return Finding("ffmpeg", False, "not found", remedy)
-    except (IndexError, ValueError, subprocess.SubprocessError):
-        pass
-    return Finding("ffmpeg", False, "the program of that name is none", remedy)
+        import imageio_ffmpeg
+
+        found = imageio_ffmpeg.get_ffmpeg_version()
+    # A program of that name may be another, of which nothing is known.
+    except (ImportError, RuntimeError, OSError, IndexError, ValueError, subprocess.SubprocessError):
+        found = ""
+    return Finding("ffmpeg", bool(found), found or "does not work", remedy)
 
 
 def _optional_packages() -> dict[str, str]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from annelid.arena.geoms import GROUND_RGBA, PLAIN_RGBA, add_looks
-from annelid.body import build_spec, worm_of
+from annelid.body import build_spec, robot_spec, worm_of
 from annelid.body.actuation import crossing_site, ring_names
 from annelid.body.constraint_rows import tied_bodies
 from annelid.body.formulations.rods.net import STRAND_RGBA
@@ -131,7 +131,7 @@ class DrawnRobot(DrawnWorm):
         robot = config.body.own_model
         assert robot is not None
         self._behind, self.upright = background_of(background), np.eye(3)
-        spec = mujoco.MjSpec.from_string(robot.xml)
+        spec = robot_spec(config)
         for number, geom in enumerate(spec.geoms):
             geom.name = geom.name or f"{LOOKS}{number}"
         alone = spec.copy().compile()

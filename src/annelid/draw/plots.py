@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from annelid.analysis.paper import published
+from annelid.analysis.paper import changed_fields, published
 from annelid.analysis.rhythm import CONTRACTED, segment_activation, stretches
+from annelid.config.fidelity import RESOLUTION
 from annelid.draw.canvas import canvas, line_entries, line_looks, panel_title, plain, save
 from annelid.draw.figures import RUN_FIGURES
 from annelid.errors import RunFileError
@@ -32,9 +33,9 @@ def figure7(run: Run, path: str | Path) -> Path:
     """Draws the counterpart of the paper's Fig. 7: membrane potentials and stretch sensor lengths.
 
     Three panels over time, one colour and line style per segment: potentials of the half-centres (contraction neurons
-    thick, expansion neurons thin), the phases in which each segment contracts, and the stretch sensors' lengths (thick:
-    mean of the segment's sensors, thin: the first of them). Horizontal lines are the rest length and, where there are
-    published elongations, the lengths at which these end.
+    thick, expansion neurons thin) or, without half-centres, of all neurons; the phases in which each segment
+    contracts; and the stretch sensors' lengths (thick: mean of the segment's sensors, thin: the first of them).
+    Horizontal lines are the rest length and, where there are published elongations, the lengths at which these end.
 
     Args:
         run: The run.
@@ -85,16 +86,30 @@ def neuron_potentials(run: Run, role: str) -> dict[int, Array]:
 
 
 def _potentials(axes: Axes, run: Run, looks: list[dict]) -> None:
-    panel_title(axes, "Half-centres")
     axes.set_ylabel("membrane potential\nabove rest (mV)")
-    if "potential" not in run.data:
-        axes.text(0.5, 0.5, "no neurons recorded", transform=axes.transAxes, ha="center", color="0.4")
-        return
     widths = {"contraction": _THICK, "expansion": _THIN}
-    for role, width in widths.items():
-        for segment, trace in neuron_potentials(run, role).items():
-            axes.plot(run.data["time"].values, trace, **looks[segment - 1], linewidth=width)
-    _legend(axes, [("0.25", "-", width, f"{role} neuron") for role, width in widths.items()])
+    halves = {role: found for role in widths if (found := neuron_potentials(run, role))}
+    if "potential" not in run.data or not run.data.sizes["neuron"]:
+        panel_title(axes, "Neurons")
+        axes.text(0.5, 0.5, "no neurons recorded", transform=axes.transAxes, ha="center", color="0.4")
+    elif not halves:
+        _all_potentials(axes, run)
+    else:
+        panel_title(axes, "Half-centres")
+        for role, traces in halves.items():
+            for segment, trace in traces.items():
+                axes.plot(run.data["time"].values, trace, **looks[segment - 1], linewidth=widths[role])
+        _legend(axes, [("0.25", "-", widths[role], f"{role} neuron") for role in halves])
+
+
+def _all_potentials(axes: Axes, run: Run) -> None:
+    """Draws the neurons of a network that has no half-centres, the first of many, with their names."""
+    potential = run.data["potential"].isel(neuron=slice(_MOST_NAMED))
+    n, n_all = potential.sizes["neuron"], run.data.sizes["neuron"]
+    panel_title(axes, "Neurons" if n == n_all else f"Neurons, the first {n} of {n_all}")
+    for trace, name, look in zip(potential.values.T, potential["neuron"].values, line_looks(n), strict=True):
+        axes.plot(run.data["time"].values, trace, **look, linewidth=1.2, label=plain(str(name)))
+    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=6.5, handlelength=2.6)
 
 
 def _phases(axes: Axes, run: Run, looks: list[dict]) -> None:
@@ -171,7 +186,10 @@ def _name_level(axes: Axes, level: float, text: str) -> None:
 
 def _published_levels(run: Run) -> list[float]:
     """Where each segment's published elongation ends, cm: above the lowest length where it is peak to peak, or rest."""
-    beside = published(run.config)
+    beside = published(run.config, run.data.attrs.get("controller"))
+    changed = set(changed_fields(run.config)[1]).difference(RESOLUTION) if beside else set()
+    if any(field.startswith(("body.", "controller.")) for field in changed):
+        return []  # Of another worm they would be read as what it must reach.
     starts = {
         "elongation_first_helix_pp_m": run.data["stretch_length"].values[:, :, 0].min(axis=0),
         "elongation_mean_max_m": run.data["stretch_rest_length"].values.mean(axis=1),

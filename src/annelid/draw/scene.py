@@ -126,7 +126,7 @@ class WormScene(_Scene):
         words: bool = True,
     ) -> None:
         body = run.config.body
-        angles = view_angles(camera, body.first_heading_deg)
+        angles = view_angles(camera)
         worm = (DrawnWorm if body.own_model is None else DrawnRobot)(run.config, background)
         self.times_s: Array = run.data["frame_time"].values
         self._qpos = postures_of(run, worm.model.nq)
@@ -160,14 +160,13 @@ class PostureScene(_Scene):
     """
 
     def __init__(self, config: RunConfig, width: int, height: int, camera: str) -> None:
-        # The model's own rest has no heading.
-        angles, headed = view_angles(camera), view_angles(camera, config.body.first_heading_deg)
+        angles = view_angles(camera)
         worm = DrawnWorm(config)
         points = worm.part_ends(worm.model.qpos0)
         offsets = (points - _middle(points)) @ worm.upright.T
         distance = ROOM * fitting_distance(offsets, *angles, width / height)
         dim(worm.model, angles[1])
-        super().__init__(worm, (width, height), headed, distance, fine=False)
+        super().__init__(worm, (width, height), angles, distance, fine=False)
 
     def picture(self, qpos: Array, activation: Array, caption: str) -> NDArray[np.uint8]:
         """Draws a posture, with activation ``(n_muscles,)``, as pixels of shape ``(height, width, 3)``."""

@@ -19,7 +19,7 @@ from annelid.lazy import lazy
 if TYPE_CHECKING:
     from annelid.environments.observation import Layout
     from annelid.environments.single import WormEnv
-    from annelid.environments.task import Weights
+    from annelid.environments.task import WEIGHTS
 
 NAMESPACE = "annelid"
 PIPE_EPISODE_S = 60.0
@@ -29,7 +29,7 @@ ENVIRONMENTS: dict[str, dict[str, Any]] = {
 }
 """Names within the namespace, and what they set beyond the defaults of `WormEnv`."""
 
-__all__ = ["ENVIRONMENTS", "Layout", "Weights", "WormEnv"]
+__all__ = ["ENVIRONMENTS", "WEIGHTS", "Layout", "WormEnv"]
 
 try:
     from gymnasium.envs.registration import register
@@ -40,5 +40,9 @@ for _name, _kwargs in ENVIRONMENTS.items():
     register(f"{NAMESPACE}/{_name}", entry_point="annelid.environments.single:WormEnv", kwargs=_kwargs)
 
 __getattr__, __dir__ = lazy(
-    __name__, {"WormVectorEnv": "make many worms with gymnasium.make_vec or gymnasium.vector.AsyncVectorEnv"}
+    __name__,
+    {
+        "Weights": "WEIGHTS has the usual weights by name",
+        "WormVectorEnv": "make many worms with gymnasium.make_vec or gymnasium.vector.AsyncVectorEnv",
+    },
 )

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from annelid.arena.centre_line import AHEAD, LEFT, UP
 from annelid.config import ArenaKind
 from annelid.markdown import table
-from annelid.morphology import Array, heading_turn
+from annelid.morphology import Array
 from annelid.protocols import SIDES
 from annelid.simulation.worm import WormPlant
 
@@ -31,10 +31,10 @@ class Place(NamedTuple):
 class Route:
     """The path that a worm is to go: straight ahead on open ground, or along a pipe's centre line."""
 
-    def __init__(self, arena: ArenaKind, heading_deg: float = 0.0) -> None:
-        """Takes the arena, and the heading at the start."""
+    def __init__(self, arena: ArenaKind) -> None:
+        """Takes the arena."""
         self._line = arena.centre_line()
-        self._axes = np.stack([AHEAD, LEFT, UP]) @ heading_turn(heading_deg).T
+        self._axes = np.stack([AHEAD, LEFT, UP])
 
     def place(self, ring_centre_m: Array) -> Place:
         """Finds a worm's place from the centres of its rings, m, ``(n_segments, 3)``."""

@@ -109,8 +109,8 @@ class WormEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.layout: Layout = layout_of(worm)
         self.observation_space = self.layout.space()
         self.action_space = Box(0.0, 1.0, (worm.n_muscles,), np.float32)
-        body, ground = body_and_arena(task.config)
-        self._route = Route(ground, body.heading_deg)
+        _, ground = body_and_arena(task.config)
+        self._route = Route(ground)
         geometry = worm.geometry
         self._weight_N = worm.total_mass_kg * STANDARD_GRAVITY_M_PER_S2
         self._begin(np.zeros(worm.n_muscles))
@@ -170,11 +170,11 @@ class WormEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         weights, per_length_and_s = task.weights, 1.0 / (length_m * task.interval_s)
         effort = 0.0 if stopped else float(np.mean(self._activation * self._activation))
         terms = {
-            "reward_progress": weights.progress * ((now.place.along_m - before.place.along_m) * per_length_and_s),
-            "reward_effort": 0.0 - weights.effort * effort,
-            "reward_slip": 0.0 - weights.slip * ((now.slid_m - before.slid_m) * per_length_and_s),
-            "reward_success": weights.success * float(passed),
-            "reward_failure": 0.0 - weights.failure * float(bool(stopped)),
+            "reward_progress": weights["progress"] * ((now.place.along_m - before.place.along_m) * per_length_and_s),
+            "reward_effort": 0.0 - weights["effort"] * effort,
+            "reward_slip": 0.0 - weights["slip"] * ((now.slid_m - before.slid_m) * per_length_and_s),
+            "reward_success": weights["success"] * float(passed),
+            "reward_failure": 0.0 - weights["failure"] * float(bool(stopped)),
         }
         info = {
             **terms,

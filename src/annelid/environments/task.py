@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 from annelid.body import worm_of
@@ -21,23 +21,8 @@ UNUSED = ("controller", "turning", "record", "duration", "seed", "clock.control"
 _WITHOUT_CONTROLLER = {"controller": {"kind": "sns"}, "turning": None}
 
 
-@dataclass(frozen=True, slots=True)
-class Weights:
-    """What the terms of the reward are multiplied by.
-
-    Attributes:
-        progress: Of the speed of the worm's middle along its route, body lengths a second.
-        effort: Of the mean square of the action, subtracted.
-        slip: Of the mean speed at which segments slide on the ground, body lengths a second, subtracted.
-        success: Given once, when a worm has passed its pipe.
-        failure: Taken once, when the simulation of the worm breaks down.
-    """
-
-    progress: float = 1.0
-    effort: float = 0.05
-    slip: float = 0.1
-    success: float = 10.0
-    failure: float = 10.0
+WEIGHTS: Mapping[str, float] = {"progress": 1.0, "effort": 0.05, "slip": 0.1, "success": 10.0, "failure": 10.0}
+"""What each term of the reward is multiplied by, by its name; docs/environments.md defines the terms."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +32,7 @@ class Task:
     config: RunConfig  # body, arena, sensors and guard; both clocks are those of the physics
     moves_per_step: int  # physics steps in a step of the environment
     steps_per_episode: int  # steps of the environment until the time is up
-    weights: Weights  # of the reward
+    weights: Mapping[str, float]  # of the terms of the reward
     start_activation: float  # largest activation that a ring may have at the start
     goal_m: float | None  # arc length of the pipe at which the worm's middle has passed; None on open ground
 
@@ -76,16 +61,14 @@ def task_of(
     moves = _whole("interval_s", interval_s, "clock.physics_timestep_s", physics_s)
     steps = _whole("episode_s", episode_s, "interval_s", interval_s)
     config = config.model_copy(update={"clock": Clock(control_timestep_s=physics_s, physics_timestep_s=physics_s)})
-    names = [field.name for field in fields(Weights)]
     for name, value in (weights or {}).items():
-        if name not in names:
-            raise ConfigError(f"unknown weight {name!r}: {suggest(name, names)}")
+        if name not in WEIGHTS:
+            raise ConfigError(f"unknown weight {name!r}: {suggest(name, WEIGHTS)}")
         require_at_least(0.0, **{f"weights[{name!r}]": value})
-    checked = Weights(**{name: float(value) for name, value in (weights or {}).items()})
     # The middle of a worm has passed a pipe behind all that bends or narrows, else a body length on.
     reach_m = config.arena.reach_m() if config.arena is not None else None
     goal_m = None if reach_m is None else reach_m[1] or worm_of(config).geometry().length_m
-    return Task(config, moves, steps, checked, float(start_activation), goal_m)
+    return Task(config, moves, steps, {**WEIGHTS, **(weights or {})}, float(start_activation), goal_m)
 
 
 def _worm(preset: str, changes: Mapping[str, Any], arena: str | None, fidelity: str | None) -> RunConfig:

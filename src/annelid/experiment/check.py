@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from concurrent.futures import Executor
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,24 +13,21 @@ import numpy as np
 
 from annelid.analysis import NUMBERS
 from annelid.config import RunConfig
-from annelid.errors import ConfigError, listed
-from annelid.experiment.case import Case
+from annelid.errors import listed
 from annelid.experiment.finer_runs import STEP, finer_steps, more_elements, run_with_variants
 from annelid.experiment.outcome import Outcome
 from annelid.experiment.progress import StudyProgress
-from annelid.experiment.store import Done, Store
+from annelid.experiment.store import Done
 from annelid.output import write_json
 from annelid.simulation.lock import locks
 from annelid.simulation.runfile import Run, open_run
 
-__all__ = ["Check", "Refinement", "check", "compare", "refinements"]
+__all__ = ["Check", "check"]
 
 RUNS = "check"
 """Subfolder of the runs, and the name of the file of results."""
 RESOLVED = 0.1
 """Share of a number by which it may move; of a number that is a share, the change itself."""
-HALF, MORE = "half_step", "more_elements"
-"""The two refinements."""
 CHECKED = (
     "period_s",
     "elongation_first_helix_pp_m",
@@ -58,38 +55,19 @@ CHECKED = (
 """The numbers that are compared, of `NUMBERS`."""
 
 
-@dataclass(frozen=True, eq=False)
-class Refinement:
-    """How a run is repeated more finely.
-
-    Attributes:
-        name: `HALF` or `MORE`.
-        words: What is finer, in a few words.
-        changes: Fields that differ, by dotted path.
-        field: The one that is finer.
-    """
-
-    name: str
-    words: str
-    changes: Mapping[str, Any]
-    field: str
-
-
 @dataclass(frozen=True)
 class Check:
     """How far a run's numbers move when it is computed more finely.
 
     Attributes:
-        moved: By number and refinement, the change over the run's own value; of a number that is a share, the change
-            itself. The largest over the segments; infinite where only one of the two runs has the number.
-        refinements: What was made finer.
-        left_out: What was not, and why, in a sentence; empty if nothing was.
+        finer: What was made finer, in a few words, with the fields that differ, by dotted path.
+        moved: By number and what was made finer, the change over the run's own value; of a number that is a share, the
+            change itself. The largest over the segments; infinite where only one of the two runs has the number.
         differences: What differs otherwise (order of contractions, a finer run is stopped or fails), a clause each.
     """
 
+    finer: Mapping[str, Mapping[str, Any]]
     moved: Mapping[str, Mapping[str, float]]
-    refinements: tuple[Refinement, ...]
-    left_out: str
     differences: tuple[str, ...]
 
     def largest(self, name: str) -> float:
@@ -106,44 +84,27 @@ class Check:
         """Whether all numbers move by at most `RESOLVED`, and nothing else differs."""
         return not self.unresolved and not self.differences
 
-    @property
-    def worst(self) -> str | None:
-        """The number that moves most; None where none was compared."""
-        return max(self.moved, key=self.largest, default=None)
-
     def cell(self, name: str) -> str:
         """Says how far a number moves, for a table; empty where it was not compared."""
         if name not in self.moved:
             return ""
         return percent(self.largest(name)) + ("\nnot resolved" if self.largest(name) > RESOLVED else "")
 
-    def _named(self, name: str) -> str:
-        return f"{NUMBERS[name].label} ({percent(self.largest(name))})"
-
-    @property
-    def brief(self) -> str:
-        """Says in a few words what keeps the run from being resolved: another order, or the number that moves most."""
-        if self.differences or self.worst is None:
-            return self.differences[0] if self.differences else ""
-        return f"{NUMBERS[self.worst].label} {percent(self.largest(self.worst))}"
-
     @property
     def sentence(self) -> str:
         """Says in plain words what the check has found."""
-        finer = " and ".join(one.words for one in self.refinements)
-        further = f" {self.left_out}" if self.left_out else ""
+        finer = " and ".join(self.finer)
         if self.resolved:
-            most = "" if self.worst is None else f"; most of all moves {self._named(self.worst)}"
-            return f"Resolved: with {finer} no number moves by more than {percent(RESOLVED)}{most}.{further}"
+            return f"Resolved: with {finer} no number moves by more than {percent(RESOLVED)}."
         faults = [*self.differences]
         if self.unresolved:
-            named = listed(map(self._named, self.unresolved))
+            named = listed(f"{NUMBERS[name].label} ({percent(self.largest(name))})" for name in self.unresolved)
             faults.append(f"these numbers move by more than {percent(RESOLVED)}: {named}")
         # A finer step costs less than a finer mesh, so that it comes first where both help.
-        by_step = not self.unresolved or any(self.moved[name].get(HALF, 0.0) > RESOLVED for name in self.unresolved)
-        try_this = self.refinements[0 if by_step else -1]
-        advice = f"Try --set {try_this.field}={try_this.changes[try_this.field]:g}, and check again."
-        return f"Not resolved: with {finer} {'; '.join(faults)}. {advice}{further}"
+        moved = [self.moved[name] for name in self.unresolved]
+        helps = [one for one in self.finer if any(by.get(one, 0.0) > RESOLVED for by in moved)]
+        field, value = next(iter(self.finer[(helps or [*self.finer])[0]].items()))
+        return f"Not resolved: with {finer} {'; '.join(faults)}. Try --set {field}={value:g}, and check again."
 
     def to_dict(self) -> dict[str, Any]:
         """Returns all of it for JSON, where a change is None if only one of the two runs has the number."""
@@ -152,12 +113,11 @@ class Check:
             "sentence": self.sentence,
             "limit": RESOLVED,
             "moved": {
-                name: {of: None if math.isinf(share) else share for of, share in by.items()}
+                name: {finer: None if math.isinf(share) else share for finer, share in by.items()}
                 for name, by in self.moved.items()
             },
             "not_resolved": list(self.unresolved),
-            "refinements": [asdict(one) for one in self.refinements],
-            "left_out": self.left_out,
+            "finer": {finer: dict(changes) for finer, changes in self.finer.items()},
             "differences": list(self.differences),
         }
 
@@ -167,65 +127,45 @@ def percent(share: float) -> str:
     return "lost" if math.isinf(share) else f"{100 * share:.2g} %" if share < 0.995 else f"{100 * share:.0f} %"
 
 
-def refinements(config: RunConfig) -> tuple[tuple[Refinement, ...], str]:
-    """Returns how a run is repeated more finely, and what is left as it is, in a sentence.
-
-    Args:
-        config: The run's configuration.
-
-    Raises:
-        ConfigError: Half of the physics step is no multiple of the control step.
-    """
-    control_s, step_s = config.clock.control_timestep_s, config.clock.physics_timestep_s
-    ratio = round(step_s / control_s)
-    if ratio > 1 and ratio % 2:
-        raise ConfigError(
-            f"{STEP} = {step_s:g}: half of it is no multiple of clock.control_timestep_s = {control_s:g}, so it cannot "
-            f"be checked: set it to {(ratio - 1) * control_s:g} or {(ratio + 1) * control_s:g}"
-        )
-    half = finer_steps(config)[0]
-    by_step = Refinement(HALF, f"half the step ({1e3 * half[STEP]:g} ms)", half, STEP)
-    elements, more = config.body.elements, more_elements(config)
-    if elements is None:
-        return (by_step,), f"A body of kind {config.body.kind!r} has no elements: only its step is halved."
-    if config.body.is_papers:
-        return (by_step,), "A chain keeps the paper's elements: only its step is halved."
-    if not more:
-        return (by_step,), f"The mesh has {elements.most} elements a side, the most that are allowed."
-    words = f"one more element a side ({elements.number + 1})"
-    return (by_step, Refinement(MORE, words, more[0], elements.field)), ""
+def refinements(config: RunConfig) -> dict[str, Mapping[str, Any]]:
+    """Returns how a run is repeated more finely: what differs, by what is finer; a chain keeps the paper's elements."""
+    half, elements = finer_steps(config)[0], config.body.elements
+    finer: dict[str, Mapping[str, Any]] = {f"half the step ({1e3 * half[STEP]:g} ms)": half}
+    if elements is not None and not config.body.is_papers:
+        finer |= {f"one more element a side ({elements.number + 1})": more for more in more_elements(config)[:1]}
+    return finer
 
 
-def compare(run: Outcome, finer: Mapping[Refinement, Done], left_out: str = "") -> Check:
-    """Compares a run's numbers with those of finer ones.
-
-    Args:
-        run: The run.
-        finer: What became of each finer run.
-        left_out: What was not refined, and why, in a sentence.
-    """
+def compare(run: Outcome, finer: Mapping[str, Mapping[str, Any]], runs: Mapping[str, Done]) -> Check:
+    """Compares a run's numbers with those of finer ones, what became of which is given by what is finer."""
     moved: dict[str, dict[str, float]] = {}
     differences: list[str] = []
-    for one, done in finer.items():
-        if done.outcome is None or done.outcome.message:
-            ended = "fails" if done.outcome is None else "is stopped"
-            differences.append(f"the run with {one.words} {ended} ({done.reason})")
+    for words, done in runs.items():
+        if done.outcome is None or done.reason:
+            differences.append(f"the run with {words} {'is stopped' if done.outcome else 'fails'} ({done.reason})")
             continue
         found = done.outcome
         if (found.rhythm.verdict, found.summary.wave) != (run.rhythm.verdict, run.summary.wave):
-            differences.append(f"the order of contractions is another one with {one.words}")
+            differences.append(f"the order of contractions is another one with {words}")
         for name in CHECKED:
             before, after = getattr(run.summary, name), getattr(found.summary, name)
             change = _change(before, after, of_share=NUMBERS[name].unit == "1")
             if change is not None:
-                moved.setdefault(name, {})[one.name] = change
-    return Check(moved, tuple(finer), left_out, tuple(differences))
+                moved.setdefault(name, {})[words] = change
+    return Check(finer, moved, tuple(differences))
 
 
 def _change(value: Any, other: Any, *, of_share: bool) -> float | None:
     if value is None or other is None:
         return None if value is None and other is None else math.inf
     before, after = np.atleast_1d(value).astype(float), np.atleast_1d(other).astype(float)
+    # A segment that has not contracted yet has no force.
+    there = ~np.isnan(before)
+    if (there == np.isnan(after)).any():
+        return math.inf
+    if not there.any():
+        return None
+    before, after = before[there], after[there]
     scale = np.ones(len(before)) if of_share else np.abs(before)
     if not scale.all():
         return 0.0 if (before == after).all() else math.inf
@@ -245,7 +185,7 @@ def check(
     """Runs a worm, and beside it the same worm at half the step and with one more element a side.
 
     Args:
-        config: Any worm; what a planar one or a chain has no finer form of is left out, and the check says so.
+        config: Any worm; of a planar one or a chain only the step is made finer.
         folder: Folder of the run, ``run.nc``; all runs are kept in ``check`` below it, and a second call goes on.
         executor: Who computes the runs; None for processes of this machine.
         jobs: How many processes, by default one a core.
@@ -256,37 +196,15 @@ def check(
         The run, and what its numbers owe to step and mesh.
 
     Raises:
-        ConfigError: Half of the step does not fit the control step, or the folder is in use.
+        ConfigError: The folder is in use.
         RunFileError: A file cannot be written.
         SimulationStopped: A guard stopped the run itself; its file is kept.
         KeyboardInterrupt: Finished runs are kept, the run itself also as ``run.nc``.
     """
-    folder = Path(folder)
-    finer, left_out = refinements(config)
-    itself, *done = run_with_variants(
-        config,
-        folder,
-        RUNS,
-        [one.changes for one in finer],
-        executor=executor,
-        jobs=jobs,
-        overwrite=overwrite,
-        progress=progress,
-    )
+    folder, finer = Path(folder), refinements(config)
+    how: dict[str, Any] = {"executor": executor, "jobs": jobs, "overwrite": overwrite, "progress": progress}
+    itself, *done = run_with_variants(config, folder, RUNS, [*finer.values()], **how)
     assert itself.outcome is not None
-    found = compare(itself.outcome, dict(zip(finer, done, strict=True)), left_out)
+    found = compare(itself.outcome, finer, dict(zip(finer, done, strict=True)))
     write_json(folder / f"{RUNS}.json", found.to_dict())
     return open_run(folder), found
-
-
-def check_runs(store: Store, cases: Sequence[Case]) -> list[Check]:
-    """Checks runs that a store has, by finer ones that it computes and keeps.
-
-    Raises:
-        ConfigError: Half of a step is no multiple of the control step.
-        KeyboardInterrupt: Finished runs are kept.
-    """
-    plans = [(case, *refinements(case.config)) for case in cases]
-    finer = [Case(case.preset, one.changes, case.config) for case, found, _ in plans for one in found]
-    done = iter(store.finish(finer, "finer runs"))
-    return [compare(store[case], {one: next(done) for one in found}, left_out) for case, found, left_out in plans]

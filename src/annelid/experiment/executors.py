@@ -1,15 +1,12 @@
-"""Who computes runs: processes of this machine, the workers of a Dask scheduler, or any other executor."""
+"""Who computes runs: processes of this machine, or any other executor."""
 
 from __future__ import annotations
 
 import _thread
-import asyncio
-import logging
 import os
 import signal
 import threading
 import time
-import warnings
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import (
     BrokenExecutor,
@@ -22,19 +19,15 @@ from concurrent.futures import (
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from functools import partial
 from multiprocessing import get_context
-from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any
 
-from annelid.errors import ClusterError, ConfigError, MissingDependency, RunKilled, shown
-from annelid.textfiles import read_json
+from annelid.errors import ClusterError, RunKilled
 
 ATTEMPTS = 3
 """How often a call is tried whose process dies."""
 GRACE_S = 2.0
 """How long a run has to end in good order and to clear away its files, s."""
-JOIN_S = 10.0
-"""How long a scheduler may take to answer, s."""
 POLL_S = 0.5
 """How often a caller that waits can be interrupted, s."""
 _SINGLE_THREADED = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
@@ -167,58 +160,3 @@ def _end(wait: Callable[[], object]) -> None:
         _thread.interrupt_main(signal.SIGTERM)
         time.sleep(GRACE_S)
         os._exit(1)
-
-
-@contextmanager
-def scheduler(where: str) -> Iterator[Executor]:
-    """Gives the workers of a Dask scheduler that is running somewhere.
-
-    Args:
-        where: As the user gave it, since a scheduler runs code here: its address, or the path of the file that
-            ``dask scheduler --scheduler-file`` writes.
-
-    Raises:
-        ConfigError: It is no such address or file.
-        MissingDependency: Dask is not installed.
-        ClusterError: No scheduler answers there.
-    """
-    address = _address(where)
-    try:
-        from distributed import Client
-    except ImportError:
-        raise MissingDependency("schedulers need Dask: install it with  pip install 'annelid[sweep]'") from None
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)
-    try:
-        # In a thread, since this one may have a loop that runs, as in a notebook.
-        with ThreadPoolExecutor(1) as thread:
-            thread.submit(asyncio.run, _greet(address)).result()
-        client = Client(address, timeout=JOIN_S)
-    except (OSError, ValueError, TypeError) as error:
-        raise ClusterError(f"no scheduler answers at {address}: start one with  dask scheduler") from error
-    try:
-        if not client.nthreads():
-            warnings.warn(f"no workers yet: start them with  dask worker {where} --nthreads 1", stacklevel=2)
-        yield client.get_executor(pure=False)
-    finally:
-        client.close(timeout=2)
-
-
-def _address(where: str) -> str:
-    address: object = where
-    if where.endswith(".json"):
-        content = read_json(Path(where), "the scheduler file")
-        address = content.get("address") if isinstance(content, dict) else None
-    if not (isinstance(address, str) and address.startswith(("tcp://", "tls://")) and address.isprintable()):
-        named = "scheduler" if address is where else f"the scheduler file {where} has address"
-        valid = "must be tcp://HOST:PORT, tls://HOST:PORT, or the path of a scheduler file (.json)"
-        raise ConfigError(f"{named} = {shown(address)}: {valid}")
-    return address
-
-
-async def _greet(address: str) -> None:
-    """Shakes hands with a scheduler: Dask's client would wait for ever for one that accepts and is silent."""
-    from distributed import Security
-    from distributed.comm.core import connect
-
-    greeting = connect(address, timeout=JOIN_S, **Security().get_connection_args("client"))
-    (await asyncio.wait_for(greeting, JOIN_S)).abort()

@@ -146,7 +146,7 @@ def applicable(config: RunConfig, spread: Spread) -> tuple[Spread, dict[str, str
     if config.body.elements is None:
         raise ConfigError(
             f"body.kind = {config.body.kind!r} has no calibrated parameters and no elements, so no error bars; they "
-            "are for the 3D worm (body.kind = 'worm')"
+            "are for the 3D worm (body.kind = 'worm'). --check shows what the step changes, a sweep what a field does"
         )
     left_out: dict[str, str] = {}
     errors = dict(zip(spread.names, spread.relative_error.tolist(), strict=True))

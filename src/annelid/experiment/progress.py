@@ -8,8 +8,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TextIO
 
-from annelid.simulation.progress import clock_text
-
 StudyProgress = Callable[[str, int, int, float], object]
 """Called with the stage, the number of its runs done, their total, and the share of its work that is done."""
 
@@ -24,27 +22,10 @@ def study_progress(*, quiet: bool = False) -> Iterator[StudyProgress | None]:
     elif sys.stderr.isatty():
         from annelid.terminal import progress_bar
 
-        time_left = TimeLeft()
         with progress_bar(transient=True) as draw:
-            yield lambda stage, done, total, share: draw(stage, share, _text(done, total, time_left(stage, share)))
+            yield lambda stage, done, total, share: draw(stage, share, _counted(done, total))
     else:
         yield Lines(sys.stderr)
-
-
-class TimeLeft:
-    """Estimates the end of a stage from the share of its work that was done since it began."""
-
-    def __init__(self) -> None:
-        self._stage: str | None = None
-        self._start = (0.0, 0.0)
-
-    def __call__(self, stage: str, share: float) -> float | None:
-        """Returns the time left in s, or None as long as it cannot be known."""
-        now = time.monotonic()
-        if stage != self._stage or share < self._start[1]:
-            self._stage, self._start = stage, (now, share)
-        began, before = self._start
-        return (now - began) * (1.0 - share) / (share - before) if share > before else None
 
 
 class Lines:
@@ -52,19 +33,18 @@ class Lines:
 
     def __init__(self, stream: TextIO, *, at_once: bool = True) -> None:
         """Takes where to write; the first line comes at once, or after ten seconds."""
-        self._stream, self._left = stream, TimeLeft()
+        self._stream = stream
         self._last = -float("inf") if at_once else time.monotonic()
 
     def __call__(self, stage: str, done: int, total: int, share: float) -> None:
         """Takes note of how far a stage has come."""
-        left, now = self._left(stage, share), time.monotonic()
+        now = time.monotonic()
         if now - self._last >= LINE_EVERY_S:
             self._last = now
-            self._stream.write(": ".join(filter(None, (stage, _text(done, total, left)))) + "\n")
+            words = filter(None, (_counted(done, total), f"{share:.0%}"))
+            self._stream.write(": ".join(filter(None, (stage, ", ".join(words)))) + "\n")
             self._stream.flush()
 
 
-def _text(done: int, total: int, left_s: float | None) -> str:
-    runs = f"{done} of {total} runs" if total else ""
-    left = f"about {clock_text(left_s)} left" if left_s else ""
-    return ", ".join(filter(None, (runs, left)))
+def _counted(done: int, total: int) -> str:
+    return f"{done} of {total} runs" if total else ""

@@ -13,10 +13,13 @@ import numpy as np
 from annelid.config import RunConfig, Vary, field_paths, field_value, fields_of, toml_value, whole_path
 from annelid.config.study import Design
 from annelid.errors import ConfigError, suggest
+from annelid.experiment.case import SHEAR_OVER_YOUNG
 from annelid.morphology import Array
 
 DIGITS = 4
 """Significant digits of a value, so that a file that states it makes the same run."""
+
+YOUNG, SHEAR = "body.strands.young_modulus_Pa", "body.strands.shear_modulus_Pa"
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,13 +65,22 @@ def variables_of(varied: Sequence[Vary], base: RunConfig) -> list[Variable]:
     for field in fields:
         if fields.count(field) > 1:
             raise ConfigError(f"vary {field!r} stands twice: give all of its values once")
+    following = {whole_path(path, base.model_dump()) for vary in varied for path in vary.follow}
+    for field in following.intersection(fields):
+        raise ConfigError(f"vary {field!r} is varied and follows another field: leave out one of both")
+    if YOUNG in fields and SHEAR in fields_of(base) and SHEAR not in following.union(fields):
+        warnings.warn(
+            f"vary {YOUNG!r} leaves {SHEAR} = {toml_value(field_value(base, SHEAR))}, while both moduli of a material "
+            f'change together: vary both, or in a study write  follow = {{ "{SHEAR}" = {SHEAR_OVER_YOUNG:.4g} }}',
+            stacklevel=2,
+        )
     return variables
 
 
 def _variable(vary: Vary, base: RunConfig) -> Variable:
     field = whole_path(vary.field, base.model_dump())
-    # A field of another kind than the configuration's counts: the kind may be varied, too.
-    if field not in field_paths():
+    # A field of another kind than the configuration's counts: the kind may be varied, too. So does an entry of a table.
+    if field not in field_paths() and not any(field.startswith(f"{path}.") for path in fields_of(base)):
         raise ConfigError(f"vary: unknown field {vary.field!r}: {suggest(field, fields_of(base))}")
     present = field_value(base, field) if field in fields_of(base) else None
     whole = isinstance(present, int) and not isinstance(present, bool)

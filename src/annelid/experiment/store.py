@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import platform
 import shutil
-import tempfile
 import uuid
 from collections.abc import Iterable, Iterator, Mapping, MutableMapping, Sequence
 from concurrent.futures import Executor
@@ -19,15 +18,7 @@ from pathlib import Path
 from typing import Literal
 
 from annelid.config import RunConfig
-from annelid.errors import (
-    MOST_LISTED,
-    AnnelidError,
-    ClusterError,
-    ConfigError,
-    RunFileError,
-    SimulationStopped,
-    shortened,
-)
+from annelid.errors import AnnelidError, ClusterError, ConfigError, RunFileError, SimulationStopped
 from annelid.experiment.case import Case
 from annelid.experiment.executors import answers, workers
 from annelid.experiment.fingerprint import run_key
@@ -37,10 +28,7 @@ from annelid.plausibility import refuse_nonsense
 from annelid.simulation.loop import simulate
 from annelid.simulation.runfile import FILE_NAME, Run, open_run
 
-MOST_BYTES = 4 * 2**30
-"""How large a run may be that a worker sends, bytes."""
-MARK_NAME = ".store"
-"""A store's mark: a worker that reads it in the store's folder shares the file system."""
+SHARE = "name a folder with -o that all machines share under the same path"
 DRAFTS = ".*.part"
 """Folders of runs in progress."""
 
@@ -141,7 +129,8 @@ class Store:
         Raises:
             AnnelidError: A case cannot be built, or its file cannot be written, and ``failed`` is None. A run that a
                 guard stops is no error: its outcome says so.
-            ClusterError: The workers are lost for good, or have other code. Finished runs are kept.
+            ClusterError: The workers are lost for good, have other code, or do not share the folder. Finished runs are
+                kept.
             KeyboardInterrupt: Runs in progress are dropped, all others kept.
         """
         wanted = {case_key(case): case for case in cases}
@@ -160,18 +149,17 @@ class Store:
         report()
         if not missing:
             return found
-        home, mark = self.folder.resolve(), self._mark()
-        calls = (
-            (attempt, key, wanted[key].config.model_dump_json(), str(home / self.path(wanted[key]).name), mark)
-            for key in missing
-        )
+        self.folder.mkdir(parents=True, exist_ok=True)
+        places = {key: str(self.folder.resolve() / self.path(wanted[key]).name) for key in missing}
+        calls = ((attempt, key, wanted[key].config.model_dump_json(), places[key]) for key in missing)
         with workers(self.executor) as executor:
             for number, answer in answers(executor, calls):
                 key, case = missing[number], wanted[missing[number]]
                 try:
-                    if (content := answer()) is not None:
-                        fetch_run(content, self.path(case), case.config)
-                    found[key] = self[case]
+                    answer()
+                    if (kept := self._kept(case)) is None:
+                        raise ClusterError(f"a worker's run is not in {self.folder}: {SHARE}")
+                    found[key] = kept
                     if not self._whole:
                         (self.path(case) / FILE_NAME).unlink(missing_ok=True)
                 except Exception as error:
@@ -218,21 +206,13 @@ class Store:
     def _kept(self, case: Case) -> Outcome | None:
         return stored_outcome(self.path(case), whole=self._whole)
 
-    def _mark(self) -> str:
-        """Makes the folder if it is not there, and returns its mark."""
-        self.folder.mkdir(parents=True, exist_ok=True)
-        marked = self.folder / MARK_NAME
-        if not marked.exists():
-            marked.write_text(uuid.uuid4().hex, encoding="utf-8")
-        return marked.read_text(encoding="utf-8")
-
 
 def case_key(case: Case) -> str:
     """Digest of all that a case's run depends on (`fingerprint.run_key`)."""
     return run_key(case.config)
 
 
-def attempt(key: str, config_json: str, folder: str, mark: str) -> bytes | None:
+def attempt(key: str, config_json: str, folder: str) -> None:
     """Computes a run in a worker and publishes it in its store.
 
     A run that a guard stops is no error; an interrupted one is a KeyboardInterrupt.
@@ -241,10 +221,9 @@ def attempt(key: str, config_json: str, folder: str, mark: str) -> bytes | None:
         key: The run's key.
         config_json: Its configuration.
         folder: Where it goes, absolute.
-        mark: The store's mark.
 
-    Returns:
-        The file of the run where this machine does not see the store's folder.
+    Raises:
+        ClusterError: This process has other code, or does not see the store's folder.
     """
     config, home = RunConfig.model_validate_json(config_json), Path(folder)
     if run_key(config) != key:
@@ -252,14 +231,8 @@ def attempt(key: str, config_json: str, folder: str, mark: str) -> bytes | None:
             f"the worker on {platform.node()} has other code: install the same versions of Python, annelid, "
             "mujoco-core and numpy as on this machine"
         )
-    try:
-        shared = (home.parent / MARK_NAME).read_text(encoding="utf-8") == mark
-    except OSError:
-        shared = False
-    if not shared:
-        with tempfile.TemporaryDirectory(prefix="annelid-") as away:
-            compute_run(config, Path(away))
-            return (Path(away) / FILE_NAME).read_bytes()
+    if not home.parent.is_dir():
+        raise ClusterError(f"the worker on {platform.node()} does not see {home.parent}: {SHARE}")
     try:
         with _draft_of(home) as draft:
             compute_run(config, draft)
@@ -267,28 +240,6 @@ def attempt(key: str, config_json: str, folder: str, mark: str) -> bytes | None:
         # Where another attempt has won, this one's folder may have been cleared away under it.
         if stored_outcome(home) is None:
             raise
-    return None
-
-
-def fetch_run(content: object, folder: Path, config: RunConfig) -> None:
-    """Publishes a run that a worker elsewhere sent, once its file is seen to be whole and of this run."""
-    if not isinstance(content, bytes) or len(content) > MOST_BYTES:
-        raise ClusterError(f"a worker sent no run for {folder.name}: it must be a file of at most {MOST_BYTES:,} bytes")
-    with _draft_of(folder) as draft:
-        draft.mkdir()
-        (draft / FILE_NAME).write_bytes(content)
-        try:
-            sent = open_run(draft)
-            if sent.config.model_dump_json() != config.model_dump_json():
-                raise ConfigError("it is another one")
-            keep_outcome(sent)
-        except OSError:
-            raise
-        # What a file of others raises depends on what is wrong with it.
-        except Exception as error:
-            raise ClusterError(
-                f"a worker sent no run for {folder.name}: {shortened(str(error), MOST_LISTED)}"
-            ) from None
 
 
 def compute_run(config: RunConfig, folder: Path) -> None:

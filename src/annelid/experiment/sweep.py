@@ -7,9 +7,9 @@ runs.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from importlib.metadata import version
 from itertools import product
@@ -18,27 +18,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 from rich.table import Table
 
 from annelid.analysis import NUMBERS, Number
 from annelid.config import RunConfig, Study, Vary, field_paths, load_config, load_study, toml_value, unit_of
-from annelid.config.study import INSTEAD, MOST_RUNS
+from annelid.config.study import MOST_RUNS
 from annelid.draw.figures.sweep import sweep_figure, worded
-from annelid.errors import ConfigError, shown, suggest
+from annelid.errors import ConfigError, suggest
 from annelid.experiment.case import Case
-from annelid.experiment.check import Check, check_runs, refinements
 from annelid.experiment.executors import workers
 from annelid.experiment.progress import StudyProgress
-from annelid.experiment.search_space import (
-    Choice,
-    Variable,
-    from_unit,
-    sampled,
-    spread_evenly,
-    unit_samples,
-    variables_of,
-)
+from annelid.experiment.search_space import Choice, Variable, from_unit, sampled, unit_samples, variables_of
 from annelid.experiment.store import Done, Store
 from annelid.output import whole_file, write_csv
 from annelid.protocols import Array
@@ -56,15 +48,14 @@ N_SHOWN = 4
 """Numbers in the table and panels in the figure."""
 N_ENDS, N_FAILED = 3, 8
 """Rows of the table: from either end, and of reasons."""
-WORDS = {
-    "status": "complete, stopped by a guard, or failed",
-    "reason": "why a run is not complete",
-    "rhythm": "verdict on the rhythm",
-    "warnings": "what is doubtful about a run",
-    "check": "resolved, or what moves at half the step or with one more element a side",
-    "run": "folder of the run",
+WORDS: Mapping[str, tuple[str, Callable[[Done], str]]] = {
+    "status": ("complete, stopped by a guard, or failed", lambda run: run.status),
+    "reason": ("why a run is not complete", lambda run: run.reason),
+    "rhythm": ("verdict on the rhythm", lambda run: "" if run.outcome is None else run.outcome.rhythm.verdict or ""),
+    "warnings": ("what is doubtful about a run", lambda run: " | ".join(run.warnings)),
+    "run": ("folder of the run", lambda run: "" if run.outcome is None else run.outcome.path.name),
 }
-"""What is said of each run beside its numbers."""
+"""What is said of each run beside its numbers, and what that is."""
 LONG_S = 100 * 3600.0
 """Studies that take longer on one core begin with a warning, s."""
 
@@ -92,7 +83,19 @@ class Plan:
         fixed = flattened(self.study.set)
         seeds = [{"seed": seed} for seed in self.levels[REPEAT]] if REPEAT in self.levels else [{}]
         varied = [dict(zip(self.fields, sample, strict=True)) for sample in self.samples]
-        return tuple((values, Case(self.study.preset, fixed | values | seed)) for values in varied for seed in seeds)
+        follows = dict(zip(self.fields, (vary.follow for vary in self.study.vary), strict=True))
+        return tuple(
+            (values, Case(self.study.preset, fixed | values | _following(follows, values) | seed))
+            for values in varied
+            for seed in seeds
+        )
+
+
+def _following(follows: Mapping[str, Mapping[str, float]], values: Mapping[str, Any]) -> dict[str, float]:
+    """Values of the fields that keep a ratio to a varied one, by dotted path."""
+    return {
+        path: float(f"{ratio * values[field]:.6g}") for field, paths in follows.items() for path, ratio in paths.items()
+    }
 
 
 @dataclass(frozen=True)
@@ -104,32 +107,12 @@ class Sweep:
         numbers: What is read from every run.
         runs: What became of the plan's points, in their order.
         folder: Folder of the results.
-        checks: What the check of a run has found, by the run's number; only of those that were checked.
     """
 
     plan: Plan
     numbers: tuple[Number, ...]
     runs: tuple[Done, ...]
     folder: Path
-    checks: Mapping[int, Check]
-
-    @cached_property
-    def words(self) -> list[dict[str, str]]:
-        """What is said of each run, by the names of `WORDS`."""
-        found = []
-        for i, run in enumerate(self.runs):
-            check, outcome = self.checks.get(i), run.outcome
-            found.append(
-                {
-                    "status": run.status,
-                    "reason": run.reason,
-                    "rhythm": "" if outcome is None else outcome.rhythm.verdict or "",
-                    "warnings": " | ".join(run.warnings),
-                    "check": "" if check is None else "resolved" if check.resolved else check.sentence,
-                    "run": "" if outcome is None else outcome.path.name,
-                }
-            )
-        return found
 
     @cached_property
     def values(self) -> dict[str, Array]:
@@ -146,6 +129,20 @@ class Sweep:
         return found
 
     @cached_property
+    def rows(self) -> pd.DataFrame:
+        """A row a run: varied fields, seed of a repeat, what is said of it, numbers; one per segment has columns."""
+        plan = self.plan
+        columns: dict[str, Any] = {field: [label(values[field]) for values, _ in plan.points] for field in plan.fields}
+        if REPEAT in plan.levels:
+            columns["seed"] = [str(case.changes["seed"]) for _, case in plan.points]
+        columns |= {name: [said(run) for run in self.runs] for name, (_, said) in WORDS.items()}
+        for number in self.numbers:
+            values = self.values[number.name]
+            endings = [f"_{i + 1}" for i in range(values.shape[1])] if number.per_segment else [""]
+            columns |= zip((f"{number.name}{ending}" for ending in endings), values.T, strict=True)
+        return pd.DataFrame(columns).rename_axis("number")
+
+    @cached_property
     def data(self) -> xr.Dataset:
         """All numbers, labelled, each with ``units`` and ``long_name``; NaN where a run has none.
 
@@ -155,8 +152,8 @@ class Sweep:
         plan, dims = self.plan, tuple(self.plan.levels)
         levels = dict(plan.levels)
         variables: dict[str, Any] = {}
-        for name, text in WORDS.items():
-            table = np.array([said[name] for said in self.words], dtype=object).reshape(plan.shape)
+        for name, (text, _) in WORDS.items():
+            table = self.rows[name].to_numpy(dtype=object).reshape(plan.shape)
             variables[name] = (dims, table, {"units": "1", "long_name": text})
         for number in self.numbers:
             table, attrs = self.values[number.name], {"units": number.unit, "long_name": number.meaning}
@@ -174,7 +171,7 @@ class Sweep:
         meanings = field_paths()
         for i, field in enumerate(plan.fields):
             dim, values = (field, levels[field]) if field in levels else (SAMPLE, [row[i] for row in plan.samples])
-            attrs = {"units": unit_of(field) or "1", "long_name": meanings[field] or field}
+            attrs = {"units": unit_of(field) or "1", "long_name": meanings.get(field) or field}
             coords[field] = (dim, _column(values), attrs)
         return xr.Dataset(
             variables,
@@ -209,9 +206,7 @@ def sweep(
     *,
     executor: Executor | None = None,
     jobs: int | None = None,
-    check: int = 0,
     progress: StudyProgress | None = None,
-    cluster: object = None,
 ) -> xr.Dataset:
     """Computes a sweep, writes its results, and returns them.
 
@@ -222,64 +217,41 @@ def sweep(
         folder: Folder for ``sweep.nc``, ``sweep.csv``, a figure, and the runs, which a second call finds there.
         executor: Who computes the runs; None for processes of this machine.
         jobs: How many processes, by default one a core.
-        check: How many of the runs are repeated at half the step and with one more element a side.
         progress: Called at the start and after every run.
-        cluster: Replaced by ``executor``, and refused.
 
     Returns:
         Every number of summary and gait with ``units`` and ``long_name``: along the varied fields of a grid, or along
         ``sample``; further along ``repeat`` and ``segment`` where there are such. ``status``, ``reason``, ``warnings``
-        and ``run`` say of each run whether it is complete, why not, what is doubtful about it, and its folder;
-        ``check`` is "resolved" or what moves in finer runs, and empty where a run was not checked.
+        and ``run`` say of each run whether it is complete, why not, what is doubtful about it, and its folder.
 
     Raises:
-        ConfigError: The study is refused, or all of its runs are, or the check is: the step is no multiple of twice the
-            control step.
+        ConfigError: The study is refused, or all of its runs are.
         ClusterError: The workers are lost for good; finished runs are kept.
         RunFileError: A file cannot be written.
-        KeyboardInterrupt: Finished runs are kept, and the results if only the check was interrupted.
+        KeyboardInterrupt: Finished runs are kept.
     """
-    if cluster is not None:
-        raise ConfigError(f"cluster = {shown(cluster)}: clusters have no names any more: {INSTEAD}")
     with workers(executor, jobs) as given:
-        done = swept(load_study(study), Path(folder), executor=given, check=check, progress=progress)
+        done = swept(load_study(study), Path(folder), executor=given, progress=progress)
     write_results(done)
     return done.data
 
 
 def swept(
-    study: Study,
-    folder: Path,
-    *,
-    executor: Executor | None = None,
-    check: int = 0,
-    progress: StudyProgress | None = None,
+    study: Study, folder: Path, *, executor: Executor | None = None, progress: StudyProgress | None = None
 ) -> Sweep:
-    """Computes a sweep as `sweep` does, in a folder that the caller has locked.
-
-    Writes nothing but the runs and, before a check begins, the results as they are without it.
-    """
+    """Computes a sweep as `sweep` does, in a folder that the caller has locked; writes nothing but the runs."""
     numbers = chosen_numbers(study.outputs, study.rank)
     plan = plan_of(study)
-    if check < 0:
-        raise ConfigError(f"check = {check}: must be at least 0")
-    cases = [case for _, case in plan.points]
-    for case in cases if check else ():
-        try:
-            config = case.config
-        except ConfigError:
-            continue  # It is listed with its reason.
-        refinements(config)
-    store = Store(folder / RUNS, executor, study.keep, progress)
-    done = store.finish(cases, "sweep")
+    done = Store(folder / RUNS, executor, study.keep, progress).finish([case for _, case in plan.points], "sweep")
     if all(one.refused for one in done) and done[0].error is not None:
         raise done[0].error
-    found = Sweep(plan, numbers, tuple(done), folder, {})
-    if check:
-        # Whoever interrupts the check keeps the sweep.
-        write_results(found)
-        chosen = spread_evenly(check, [i for i, one in enumerate(done) if one.status == "complete"])
-        found = replace(found, checks=dict(zip(chosen, check_runs(store, [cases[i] for i in chosen]), strict=True)))
+    found = Sweep(plan, numbers, tuple(done), folder)
+    if study.rank is not None and study.rank not in (names := shown_numbers(found)):
+        instead = f"the table and the figure begin with {names[0]}" if names else "there is no figure"
+        warnings.warn(
+            f"rank = {study.rank!r}: no run has a value of it, so {instead}; a longer duration_s may give one",
+            stacklevel=2,
+        )
     return found
 
 
@@ -293,21 +265,9 @@ def chosen_numbers(names: Sequence[str], rank: str | None) -> tuple[Number, ...]
     scalars = [number.name for number in chosen if not number.per_segment]
     if rank is not None and rank not in scalars:
         raise ConfigError(
-            f"rank = {rank!r}: must be one of the outputs with one number a run: {suggest(rank, scalars)}"
+            f"rank = {rank!r}: must be one of the outputs with one number per run: {suggest(rank, scalars)}"
         )
     return chosen
-
-
-def checked_sentence(sweep: Sweep) -> str:
-    """Says how many of the runs are resolved, and which are not and why."""
-    if not sweep.checks:
-        return "No run is complete, so none was checked."
-    faults = [f"run {i} ({check.brief})" for i, check in sweep.checks.items() if not check.resolved]
-    n = len(sweep.checks)
-    counted = f"Checked {n} of {len(sweep.runs)} runs: {n - len(faults) if faults else 'all'} resolved"
-    if len(faults) > N_FAILED:
-        faults[N_FAILED:] = [f"{len(faults) - N_FAILED} more, which {ROWS} has"]
-    return f"{counted}{'; not resolved: ' if faults else ''}{', '.join(faults)}."
 
 
 def plan_of(study: Study) -> Plan:
@@ -364,30 +324,14 @@ def write_results(sweep: Sweep) -> list[Path]:
     path = sweep.folder / DATASET
     with whole_file(path) as draft:
         sweep.data.to_netcdf(draft, engine="h5netcdf")
-    written = [path, _write_rows(sweep, sweep.folder / ROWS)]
+    # NaN alone is not equal to itself.
+    cells = sweep.rows.reset_index().map(
+        lambda one: ("" if one != one else f"{one:.10g}") if isinstance(one, float) else one
+    )
+    written = [path, write_csv(sweep.folder / ROWS, cells.columns, cells.itertuples(index=False))]
     if names := shown_numbers(sweep):
         written.append(sweep_figure(_drawn(sweep.data, names), sweep.plan.fields, names, sweep.folder / FIGURE))
     return written
-
-
-def _write_rows(sweep: Sweep, path: Path) -> Path:
-    """Writes one row a run as CSV with a header; what there is per segment has a column for each."""
-    columns: dict[str, Array] = {}
-    for number in sweep.numbers:
-        values = sweep.values[number.name]
-        segments = [f"_{i + 1}" for i in range(values.shape[1])] if number.per_segment else [""]
-        columns |= zip((f"{number.name}{segment}" for segment in segments), values.T, strict=True)
-    rows = (
-        [
-            i,
-            *_varied(sweep, i),
-            *said.values(),
-            *("" if np.isnan(values[i]) else f"{values[i]:.10g}" for values in columns.values()),
-        ]
-        for i, said in enumerate(sweep.words)
-    )
-    seed = ["seed"] if REPEAT in sweep.plan.levels else []
-    return write_csv(path, ["number", *sweep.plan.fields, *seed, *WORDS, *columns], rows)
 
 
 def shown_numbers(sweep: Sweep) -> list[str]:
@@ -410,50 +354,38 @@ def _drawn(data: xr.Dataset, names: Sequence[str]) -> xr.Dataset:
 def results_table(sweep: Sweep) -> Table:
     """Returns the runs with the highest and the lowest values of the first number, and those that failed and why."""
     plan, names = sweep.plan, shown_numbers(sweep)
-    drawn = _drawn(sweep.data, names)
-    columns = [drawn[name].values.reshape(-1) for name in names]
     content = f"highest and lowest {names[0]}" if names else "no number has a value"
-    table = Table(title=f"{plan.study.name}: {content}", caption=_caption(sweep))
+    table = Table(title=f"{plan.study.name}: {content}", caption=_caption(sweep.rows))
     heads = [worded(name.rsplit(".", 1)[-1], sweep.data[name].attrs["units"]) for name in (*plan.fields, *names)]
-    n = len(plan.fields)
-    for head in ("run", *heads[:n], *([REPEAT] if REPEAT in plan.levels else []), *heads[n:]):
+    varied = [*plan.fields, *(["seed"] if REPEAT in plan.levels else [])]
+    heads[len(plan.fields) : len(plan.fields)] = [REPEAT] if REPEAT in plan.levels else []
+    for head in ("run", *heads):
         table.add_column(head, justify="right")
     if names:
-        order = [i for i in np.argsort(-columns[0], kind="stable").tolist() if np.isfinite(columns[0][i])]
+        drawn = _drawn(sweep.data, names)
+        numbers = pd.DataFrame({name: drawn[name].values.ravel() for name in names})
+        order = numbers.dropna(subset=names[:1]).sort_values(names[0], ascending=False, kind="stable").index
         for rows in [order] if len(order) <= 2 * N_ENDS else [order[:N_ENDS], order[-N_ENDS:]]:
             for i in rows:
-                values = ("" if np.isnan(column[i]) else f"{column[i]:.4g}" for column in columns)
-                table.add_row(str(i), *_varied(sweep, i), *values)
+                values = ("" if np.isnan(value) else f"{value:.4g}" for value in numbers.loc[i])
+                table.add_row(str(i), *sweep.rows.loc[i, varied], *values)
             table.add_section()
     return table
 
 
-def failures(sweep: Sweep) -> list[tuple[str, list[int]]]:
-    """Returns why runs failed or were stopped, and the numbers of those runs, the most frequent reason first."""
-    by_reason: dict[str, list[int]] = {}
-    for i, run in enumerate(sweep.runs):
-        if run.status != "complete":
-            by_reason.setdefault(f"{run.status}: {run.reason}", []).append(i)
-    return sorted(by_reason.items(), key=lambda item: -len(item[1]))
-
-
-def _caption(sweep: Sweep) -> str:
-    reasons = failures(sweep)
-    lines = [f"{len(sweep.runs)} runs, of which {sum(run.status == 'complete' for run in sweep.runs)} are complete"]
-    if doubtful := [i for i, run in enumerate(sweep.runs) if run.warnings]:
+def _caption(rows: pd.DataFrame) -> str:
+    """Says how many runs are complete or doubtful, and why others are not, the most frequent reason first."""
+    status: Any = rows["status"]
+    reasons, doubtful = status + ": " + rows["reason"], np.flatnonzero(rows["warnings"] != "").tolist()
+    lines = [f"{len(rows)} runs, of which {(status == 'complete').sum()} are complete"]
+    if len(doubtful):
         lines[0] += f", and {len(doubtful)} have warnings (run {_listed(doubtful)}), which {ROWS} has"
-    lines += [f"{len(numbers)} {reason} (run {_listed(numbers)})" for reason, numbers in reasons[:N_FAILED]]
-    if len(reasons) > N_FAILED:
-        lines.append(f"{len(reasons) - N_FAILED} more reasons in {ROWS}")
+    counted = reasons[status != "complete"].value_counts()
+    lines += [f"{n} {one} (run {_listed(rows.index[reasons == one])})" for one, n in counted[:N_FAILED].items()]
+    if len(counted) > N_FAILED:
+        lines.append(f"{len(counted) - N_FAILED} more reasons in {ROWS}")
     return "\n".join(lines)
 
 
 def _listed(numbers: Sequence[int]) -> str:
     return ", ".join(map(str, numbers[:5])) + (", .." if len(numbers) > 5 else "")
-
-
-def _varied(sweep: Sweep, i: int) -> list[str]:
-    """Values of the varied fields of a run, and its seed where there are repeats."""
-    values, case = sweep.plan.points[i]
-    seed = [str(case.changes["seed"])] if REPEAT in sweep.plan.levels else []
-    return [*map(label, values.values()), *seed]

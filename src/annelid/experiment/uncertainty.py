@@ -223,16 +223,9 @@ def uncertainty(
         raise ConfigError(f"n = {n} worms have no standard deviation: draw at least {FEWEST}")
     chosen, left_out = applicable(config, read_spread() if spread is None else spread)
     planned = plan(config, n, chosen)
-    itself, *done = run_with_variants(
-        config,
-        folder,
-        RUNS,
-        [changed for of_kind in planned.values() for changed in of_kind],
-        executor=executor,
-        jobs=jobs,
-        overwrite=overwrite,
-        progress=progress,
-    )
+    how: dict[str, Any] = {"executor": executor, "jobs": jobs, "overwrite": overwrite, "progress": progress}
+    changed = [one for of_kind in planned.values() for one in of_kind]
+    itself, *done = run_with_variants(config, folder, RUNS, changed, **how)
     assert itself.outcome is not None
     came = iter(done)
     variants = {kind: [(changed, next(came)) for changed in of_kind] for kind, of_kind in planned.items()}

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from annelid.arena.geoms import SCENE
 from annelid.body.formulations.rods.net import STRAND_RGBA
 from annelid.config import RunConfig
 from annelid.draw.canvas import CONTRACTED, RELAXED
@@ -51,7 +52,11 @@ class Painter:
         arrow_N: Contact force whose arrow is as long as the worm's radius at rest, about two segments' weight, N.
         radius_m: That radius.
         weight_N: Of the worm on Earth.
+        colored: What has the colour of the activation, where it is not a worm's rings.
+        prefix: What the names of the geoms that are drawn begin with: those of a scene.
     """
+
+    colored, prefix = "", SCENE
 
     def __init__(self, anatomy: Anatomy, config: RunConfig, grain_m: float = 0.0) -> None:
         """Takes the worm, and what places are rounded to, so that they compress."""
@@ -116,9 +121,11 @@ class PlanarPainter:
         arrow_N: Contact force whose arrow is as long as `radius_m`, N.
         radius_m: Half the height of the body at first.
         weight_N: None: it cannot be poked.
+        colored: What has the colour of the activation.
     """
 
     model = weight_N = None
+    colored = "sides of a segment, activation 0 to 1"
     arrow_N = 1.0
 
     def __init__(self, first: Moment, grain_m: float = 0.0) -> None:
@@ -149,13 +156,6 @@ class PlanarPainter:
             contacts=arrows.astype(np.float32),
             middle=middles.mean(axis=0),
         )
-
-
-def painter_of(
-    anatomy: Anatomy | None, config: RunConfig, first: Moment, grain_m: float = 0.0
-) -> Painter | PlanarPainter:
-    """Returns what draws a 3D worm, or a planar body, which has no anatomy."""
-    return PlanarPainter(first, grain_m) if anatomy is None else Painter(anatomy, config, grain_m)
 
 
 def ring_colors(activation: NDArray[np.floating], n_corners: int) -> Colors:

@@ -116,6 +116,8 @@ def _posture(body: BodyKind, plant: Plant) -> Array:
     if isinstance(plant, WormPlant):
         return plant.qpos
     assert isinstance(plant, Records)
+    if body.own_model is not None:
+        return np.asarray(plant.read(True)["qpos"])
     return body.outlines({**plant.read(False), **plant.read(True)})
 
 

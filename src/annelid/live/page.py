@@ -9,7 +9,6 @@ from pathlib import Path
 from annelid.config import RunConfig
 from annelid.draw.render import Progress
 from annelid.errors import RunFileError
-from annelid.live.lines_and_arrows import painter_of
 from annelid.live.panel import legend_html
 from annelid.live.player import player_of
 from annelid.live.scene_nodes import Stage
@@ -47,12 +46,11 @@ def export_page(
     if not 0 < speed < math.inf:
         raise RunFileError(f"speed = {speed:g}: the speed of a page must be positive and finite")
     config = source.config if isinstance(source, Run) else source
-    player, anatomy = player_of(source)
+    player, painter = player_of(source, grain_m=GRAIN_M)
     history, worm = player.history, player.worm
     first_s, last_s = history.span_s if worm is None else (0.0, config.duration_s)
     n_frames = math.floor((last_s - first_s) * FRAMES_A_SECOND + 1e-6) + 1
     shown = history.at(first_s)
-    painter = painter_of(anatomy, config, shown, GRAIN_M)
     # A server that nobody visits records what it would send.
     server = Server()
     try:
@@ -72,7 +70,7 @@ def export_page(
         page = recording.as_html()
     finally:
         server.stop()
-    page = _with_caption(page, config, legend_html(painter.arrow_N, painter.radius_m, is_planar=anatomy is None), speed)
+    page = _with_caption(page, config, legend_html(painter.arrow_N, painter.radius_m, painter.colored), speed)
     with whole_file(path) as draft:
         draft.write_text(page, encoding="utf-8")
     return path

@@ -72,7 +72,8 @@ def plots_of(names: Sequence[str]) -> dict[str, Plot]:
     segments, others = by_segment(neurons)
     plots: dict[str, Plot] = {}
     if segments:
-        plots["half-centres"] = _half_centres(segments)
+        if (halves := _half_centres(segments)).curves:
+            plots["half-centres"] = halves
         for segment, neurons in segments.items():
             labels = [role_of(neuron) for neuron in neurons]
             plots[f"neurons of segment {segment}"] = _plot(f"segment {segment}: potentials (mV)", neurons, labels)
@@ -232,8 +233,11 @@ def _series(curve: Curve, colors: Sequence[str]) -> Any:
     return series | ({"dash": (6, 4), "width": 1.1} if curve.dashed else {"width": 1.6})
 
 
-def legend_html(arrow_N: float, radius_m: float, *, is_planar: bool = False) -> str:
-    """Returns the legend; the arrow of this contact force is as long as the radius at rest, or half a planar body."""
+def legend_html(arrow_N: float, radius_m: float, colored: str = "") -> str:
+    """Returns the legend; the arrow of this contact force is as long as the radius.
+
+    What is no worm has instead of its parts what is ``colored`` by the activation.
+    """
     percent = f"{100 * SPRING_RANGE:.0f}&thinsp;%"
     rows = (
         (_bar(STRAND_COLORS, smooth=False), "strands: dark and light blue wind in opposite directions"),
@@ -244,8 +248,8 @@ def legend_html(arrow_N: float, radius_m: float, *, is_planar: bool = False) -> 
             f"force of the ground on a segment: {100 * radius_m:.0f}&thinsp;cm are {arrow_N:g}&thinsp;N",
         ),
     )
-    if is_planar:
-        rows = ((_bar((RELAXED, CONTRACTED)), "sides of a segment, activation 0 to 1"), rows[-1])
+    if colored:
+        rows = ((_bar((RELAXED, CONTRACTED)), colored), rows[-1])
     cells = "".join(
         f'<tr><td style="padding:2px 8px 2px 0;text-align:center">{mark}</td><td>{words}</td></tr>'
         for mark, words in rows

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 
-from annelid.body import worm_of
+from annelid.body import compile_robot, worm_of
 from annelid.config import RunConfig
-from annelid.errors import ConfigError, SimulationStopped
+from annelid.errors import SimulationStopped
 from annelid.live.history import History, Moment, history_of
+from annelid.live.lines_and_arrows import Painter, PlanarPainter
 from annelid.live.live_worm import LiveWorm
-from annelid.simulation.anatomy import Anatomy
+from annelid.live.robot_painter import RobotPainter
 from annelid.simulation.runfile import Run
 from annelid.simulation.worm import compile_worm
 
@@ -106,20 +107,36 @@ class Player:
         self.playing = True
 
 
-def player_of(source: RunConfig | Run, speed: float = 1.0) -> tuple[Player, Anatomy | None]:
-    """Returns the player of a configuration, which is run, or of a run, and the compiled body of a 3D worm.
+AnyPainter = Painter | PlanarPainter | RobotPainter
+
+
+def player_of(source: RunConfig | Run, speed: float = 1.0, *, grain_m: float = 0.0) -> tuple[Player, AnyPainter]:
+    """Returns the player of a configuration, which is run, or of a run, and what paints it.
+
+    Args:
+        source: The configuration or the run.
+        speed: Simulated seconds per second.
+        grain_m: What places are rounded to, where that is done.
 
     Raises:
-        ConfigError: The body is a robot that a file describes, or cannot be built.
+        ConfigError: The body cannot be viewed, or not be built.
         RunFileError: The run holds no postures.
     """
-    body = source.config.body if isinstance(source, Run) else source.body
-    if body.own_model is not None:
-        raise ConfigError(f"body.kind = {body.kind!r} cannot be viewed: use annelid run and annelid draw")
-    if not body.is_planar:
-        worm_of(source.config if isinstance(source, Run) else source)
+    config = source.config if isinstance(source, Run) else source
+    is_robot, is_planar = config.body.own_model is not None, config.body.is_planar
+    if not (is_robot or is_planar):
+        worm_of(config)
+    anatomy = n_coordinates = None
     if isinstance(source, Run):
-        anatomy = None if body.is_planar else compile_worm(source.config)
-        return Player(history_of(source, None if anatomy is None else anatomy.model.nq), speed), anatomy
-    worm = LiveWorm(source)
-    return Player(worm, speed), None if body.is_planar else worm.plant.anatomy
+        if is_robot:
+            n_coordinates = compile_robot(config).nq
+        elif not is_planar:
+            anatomy = compile_worm(config)
+            n_coordinates = anatomy.model.nq
+        player = Player(history_of(source, n_coordinates), speed)
+    else:
+        worm = LiveWorm(config)
+        player, anatomy = Player(worm, speed), None if is_robot or is_planar else worm.plant.anatomy
+    if is_robot:
+        return player, RobotPainter(config, player.moment)
+    return player, PlanarPainter(player.moment, grain_m) if anatomy is None else Painter(anatomy, config, grain_m)

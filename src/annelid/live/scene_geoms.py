@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 import mujoco
 import numpy as np
 
-from annelid.arena.geoms import SCENE
 from annelid.arena.surface import Shape, grid_faces
 from annelid.morphology import Array
 
@@ -22,10 +21,10 @@ class SceneGeoms:
     """The geoms of a compiled scene that are drawn, below a node of the viewer; none where there is no scene."""
 
     def __init__(
-        self, scene: viser.SceneApi, root: str, model: mujoco.MjModel, floor: Shape, look: dict[str, Any]
+        self, scene: viser.SceneApi, root: str, model: mujoco.MjModel, floor: Shape, look: dict[str, Any], prefix: str
     ) -> None:
-        """Adds a node for each; a plane, which has no end, is a floor at z = 0 with a look of its own."""
-        own_names = [model.geom(i).name.startswith(SCENE) for i in range(model.ngeom)]
+        """Adds a node for each whose name has a prefix; a plane, which has no end, is a floor of its own look."""
+        own_names = [model.geom(i).name.startswith(prefix) for i in range(model.ngeom)]
         seen = np.array(own_names) & (model.geom_group < GROUPS_SEEN)
         self.geoms = np.flatnonzero(seen & (model.geom_rgba[:, 3] > 0.0))
         plane = int(mujoco.mjtGeom.mjGEOM_PLANE)

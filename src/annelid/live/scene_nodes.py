@@ -23,9 +23,10 @@ from annelid.draw.camera import FIELD_OF_VIEW_DEG, fitting_distance, picture_axe
 from annelid.draw.drawn_worm import upright
 from annelid.draw.scene import ROOM
 from annelid.live.history import Moment
-from annelid.live.lines_and_arrows import CONTACT_COLOR, Painter, PlanarPainter
+from annelid.live.lines_and_arrows import CONTACT_COLOR, PlanarPainter
+from annelid.live.player import AnyPainter
 from annelid.live.scene_geoms import SceneGeoms
-from annelid.morphology import Array, heading_turn
+from annelid.morphology import Array
 
 if TYPE_CHECKING:
     import viser
@@ -62,9 +63,7 @@ class Stage:
         follow: Whether worm and ground move so that the worm's middle stays on the screen.
     """
 
-    def __init__(
-        self, server: viser.ViserServer, config: RunConfig, painter: Painter | PlanarPainter, moment: Moment
-    ) -> None:
+    def __init__(self, server: viser.ViserServer, config: RunConfig, painter: AnyPainter, moment: Moment) -> None:
         """Makes all nodes and places the camera so that the whole worm is seen."""
         from viser.transforms import SO3
 
@@ -94,19 +93,19 @@ class Stage:
             head_radius=0.009,
             head_length=0.022,
         )
-        heading = config.body.first_heading_deg
         scene.add_frame(f"{_ROOT}/ground", show_axes=False)
         if config.arena is not None:
-            _add_ground(scene, config.arena, float(np.ptp(first.strands[..., 0])), heading)
+            _add_ground(scene, config.arena, float(np.ptp(first.strands[..., 0])))
         self._geoms: SceneGeoms | None = None
-        if isinstance(painter, Painter):
-            self._geoms = SceneGeoms(scene, f"{_ROOT}/ground", painter.model, Shape(*_squares(0.0)), _FLOOR_LOOK)
+        if not isinstance(painter, PlanarPainter):
+            floor = Shape(*_squares(0.0))
+            self._geoms = SceneGeoms(scene, f"{_ROOT}/ground", painter.model, floor, _FLOOR_LOOK, painter.prefix)
         self._place_geoms()
         self._first_middle = first.middle
         self._level = config.arena is not None and config.arena.is_plane and config.arena.slope_rad == 0.0
         points = first.strands.reshape(-1, 3) @ self.turn.T
         target = (points.min(axis=0) + points.max(axis=0)) / 2
-        angles = view_angles("isometric", heading)
+        angles = view_angles("isometric")
         _, _, sight = picture_axes(*angles)
         distance = ROOM * fitting_distance(points - target, *angles, ASPECT)
         camera = server.initial_camera
@@ -133,7 +132,7 @@ class Stage:
             self._root.position = shift
 
     def _place_geoms(self) -> None:
-        if self._geoms is not None and isinstance(self._painter, Painter):
+        if self._geoms is not None and not isinstance(self._painter, PlanarPainter):
             self._geoms.place(*self._painter.places(self._geoms.geoms))
 
     def set_visible(self, layer: str, visible: bool) -> None:
@@ -147,7 +146,7 @@ class Stage:
         return (origin - self.shift_m) @ self.turn, direction @ self.turn
 
 
-def _add_ground(scene: viser.SceneApi, arena: ArenaKind, length_m: float, heading_deg: float) -> None:
+def _add_ground(scene: viser.SceneApi, arena: ArenaKind, length_m: float) -> None:
     """Adds the arena as it is seen: floor, relief, pipe, rails and posts."""
     shape, pipe = arena.shape(length_m), arena.is_closed
     if shape is not None and pipe:
@@ -162,7 +161,6 @@ def _add_ground(scene: viser.SceneApi, arena: ArenaKind, length_m: float, headin
         scene.add_mesh_trimesh(f"{_ROOT}/ground/relief", relief, cast_shadow=False, receive_shadow=False)
     if (shape is None or pipe) and not arena.is_scene:
         vertices, faces = _squares(-arena.floor_depth_m)
-        vertices = vertices @ heading_turn(heading_deg).T
         scene.add_mesh_simple(f"{_ROOT}/ground/floor", vertices, faces, **_FLOOR_LOOK)
     _add_walls(scene, arena)
 

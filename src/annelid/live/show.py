@@ -13,7 +13,7 @@ import numpy as np
 from annelid.config import RunConfig
 from annelid.errors import AnnelidError
 from annelid.live.history import Moment
-from annelid.live.lines_and_arrows import hit_point, painter_of
+from annelid.live.lines_and_arrows import hit_point
 from annelid.live.panel import Panel, Plot, legend_html, status_html
 from annelid.live.player import player_of
 from annelid.live.requests import Requests
@@ -66,8 +66,7 @@ class Show:
             RunFileError: The run holds no postures.
         """
         config = source.config if isinstance(source, Run) else source
-        self.player, anatomy = player_of(source, speed)
-        painter = painter_of(anatomy, config, self.player.moment)
+        self.player, painter = player_of(source, speed)
         self.requests = Requests()
         self._ending = threading.Event()
         self._pace: deque[tuple[float, float]] = deque()
@@ -77,7 +76,7 @@ class Show:
         self._server = Server(host, port)
         self.address = self._server.address
         self.stage = Stage(self._server, config, painter, self.player.moment)
-        legend = legend_html(painter.arrow_N, painter.radius_m, is_planar=anatomy is None)
+        legend = legend_html(painter.arrow_N, painter.radius_m, painter.colored)
         self.panel = Panel(
             self._server, self.requests, self.player, self.stage, config, painter.weight_N, legend, plots or {}
         )

@@ -64,7 +64,7 @@ __getattr__, __dir__ = lazy(
     {
         "Firing": _SPIKES,
         "SpikingSynapse": _SPIKES,
-        "Diagram": "annelid.draw.network_figure draws a network, and its method table() has the conductances",
+        "Diagram": "annelid.draw.network_figure draws a network, and its method to_toml() has the conductances",
         "Factors": _MODULATION,
         "Modulated": _MODULATION,
         "adaptive_half_centre": "adaptive_peristalsis_network has such half-centres",

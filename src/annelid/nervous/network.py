@@ -9,7 +9,6 @@ import numpy as np
 from annelid.errors import ConfigError
 from annelid.nervous.arrays import NetworkArrays, build_arrays
 from annelid.nervous.stepper import Scheme, Stepper
-from annelid.nervous.tables import markdown_tables
 from annelid.nervous.toml import read_network, write_network
 from annelid.nervous.wiring import Wiring
 
@@ -73,10 +72,6 @@ class Network(Wiring):
         raise ConfigError(
             "Network.diagram has been removed: annelid.draw.network_figure(network, 'network.svg') draws it"
         )
-
-    def table(self) -> str:
-        """Returns neurons, connections, inputs and outputs as Markdown tables."""
-        return markdown_tables(self)
 
     def to_toml(self) -> str:
         """Returns the network as TOML text, from which `from_toml` makes the same network to the last bit."""

@@ -1,4 +1,4 @@
-"""The peristalsis network of Riddle et al. 2022 and 2023 for any number of segments, and three networks made from it.
+"""The peristalsis network of Riddle et al. 2022 and 2023 for any number of segments, and one with a descending drive.
 
 Each segment has a half-centre, the contraction neuron (U1 in the papers) against the expansion neuron (U2), a sensory
 neuron (U3) that its stretch sensor drives while the segment is at rest length, and a relay (U4) to the next segment.
@@ -13,10 +13,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from functools import cached_property
 
-from annelid.errors import ConfigError, require_at_least, require_positive
+from annelid.errors import ConfigError, require_positive
 from annelid.nervous.half_centre import HalfCentre, add_half_centre, add_hold
 from annelid.nervous.network import Network
-from annelid.nervous.neurons import Neuron, Synapse
+from annelid.nervous.neurons import Neuron
 
 ROLES = ("contraction", "expansion", "sensory", "relay")
 """The four neurons of a segment, in order: U1, U2, U3, U4 of the papers."""
@@ -122,14 +122,13 @@ def peristalsis_network(n_segments: int, parameters: PeristalsisParameters | Non
     Raises:
         ConfigError: Fewer than 3 segments, or parameters that give a negative conductance.
     """
-    return _segments(f"peristalsis of {n_segments} segments", n_segments, parameters or PeristalsisParameters())
-
-
-def _segments(name: str, n_segments: int, p: PeristalsisParameters, *, relays_joined: bool = True) -> Network:
-    """Builds `peristalsis_network`, or that without the synapses from and to its relays."""
-    require_at_least(3, n_segments=n_segments)
-    g, segments = p.conductances, range(1, n_segments + 1)
-    network = Network(name)
+    if n_segments < 3:
+        raise ConfigError(
+            f"n_segments must be at least 3, not {n_segments}, for a network whose segments take turns: drive fewer by "
+            "the clock, with controller.kind = 'timed'"
+        )
+    p, segments = parameters or PeristalsisParameters(), range(1, n_segments + 1)
+    g, network = p.conductances, Network(f"peristalsis of {n_segments} segments")
     for segment in segments:
         first = segment == 1
         contraction, expansion, sensory, relay = (f"{role}_{segment}" for role in ROLES)
@@ -138,10 +137,9 @@ def _segments(name: str, n_segments: int, p: PeristalsisParameters, *, relays_jo
         network.add_neuron(sensory, p.leaky_neuron, 0.0 if first else p.range_mV)
         network.add_neuron(relay, p.leaky_neuron, 0.0)
         add_hold(network, sensory, down=contraction, up=expansion, half_centre=p)
-        if relays_joined:
-            network.add_synapse(sensory, relay, p.inhibitory(g.sensory_to_relay))
-            network.add_synapse(expansion, relay, p.excitatory(g.expansion_to_relay))
-    for segment in segments if relays_joined else ():
+        network.add_synapse(sensory, relay, p.inhibitory(g.sensory_to_relay))
+        network.add_synapse(expansion, relay, p.excitatory(g.expansion_to_relay))
+    for segment in segments:
         following = segment % n_segments + 1
         network.add_synapse(f"relay_{segment}", f"sensory_{following}", p.inhibitory(g.relay_to_next_sensory))
     for segment in segments:
@@ -201,116 +199,4 @@ def adaptive_peristalsis_network(
     network = peristalsis_network(n_segments, p)
     halves = (f"{half}_{segment}" for segment in range(1, n_segments + 1) for half in ("contraction", "expansion"))
     add_drive(network, p, halves, drive_conductance_uS(p), drive_time_constant_ms)
-    return network
-
-
-def pressure_network(
-    n_segments: int,
-    parameters: PeristalsisParameters | None = None,
-    *,
-    hold: float = 1.0,
-    release: float = 1.8,
-    exchange: float = 0.8,
-    pressure_ms: float = 30.0,
-) -> Network:
-    """Builds the peristalsis network with pressure feedback against slip; the design is our own.
-
-    On a body with weight a contracting segment stretches its neighbour, whose stretch sensor then switches off too
-    early: several segments contract at once, and the front drags along the ground. Three kinds of synapse onto sensory
-    neurons, which keep a segment expanded and end its contraction, even the wave out, so that no segment leaves the
-    ground before the one ahead has its length (the aim of Daltorio et al. 2013). Before the first segment comes the
-    last. Neurons ``pressure_s`` and ``extension_s`` of every segment come behind those of `peristalsis_network`, with
-    inputs ``load_s`` and ``length_s`` of which ``Gm R`` nA is the full scale.
-
-    Args:
-        n_segments: Number of segments, at least 3.
-        parameters: Of the paper's network.
-        hold: Potential, over R, that full pressure gives its own segment's sensory neuron: one on the ground stays
-            expanded, stretched or not, and one that lands becomes an anchor.
-        release: Currents of a stretch sensor that a full extension neuron takes from the sensory neuron of the next
-            segment, which leaves the ground once this one is extended.
-        exchange: Potential, over R, that a contraction gives the sensory neuron two segments before, so that one
-            segment shortens while another one lengthens. Three segments have none: there it would be the next one.
-        pressure_ms: Time constant of the pressure neurons, ms.
-
-    Raises:
-        ConfigError: As `peristalsis_network`; a strength below 0, or beyond what the excitatory reversal can give.
-    """
-    require_at_least(0, hold=hold, release=release, exchange=exchange)
-    p = parameters or PeristalsisParameters()
-    network, leak = peristalsis_network(n_segments, p), p.leak_conductance_uS
-    segments = range(1, n_segments + 1)
-    for segment in segments:
-        network.add_neuron(f"pressure_{segment}", Neuron(pressure_ms * leak, leak))
-        network.add_neuron(f"extension_{segment}", p.leaky_neuron)
-    for segment in segments:
-        two_before = (segment - 3) % n_segments + 1
-        if hold > 0:
-            network.add_synapse(f"pressure_{segment}", f"sensory_{segment}", p.transmission(hold))
-        if exchange > 0 and n_segments > 3:
-            network.add_synapse(f"contraction_{segment}", f"sensory_{two_before}", p.transmission(exchange))
-        if release > 0:
-            synapse = p.inhibitory(release * p.conductances.relay_to_next_sensory)
-            network.add_synapse(f"extension_{segment}", f"sensory_{segment % n_segments + 1}", synapse)
-        network.add_input(f"load_{segment}", f"pressure_{segment}")
-        network.add_input(f"length_{segment}", f"extension_{segment}")
-    return network
-
-
-def waiting_network(n_segments: int, parameters: PeristalsisParameters | None = None) -> Network:
-    """Builds a peristalsis network in which a segment waits until the one before is at rest again; our own design.
-
-    In the paper's network a segment contracts when the one before begins to lengthen its ring. Here it contracts when
-    that one is back at rest length. The relays are joined differently, and a neuron ``memory_s`` of every segment,
-    which remembers that it was the last to contract, comes behind those of `peristalsis_network`; inputs and outputs
-    are the same. With the conductance ``g = Gm R / (E_ex - R)`` of a `transmission`, and R as the potential of a
-    neuron that is on:
-
-    1. *The memory is a latch.* The contraction neuron excites it with g, and so does the memory itself, from 0.4 R on
-       and in full from 0.6 R. Without contraction it therefore rests at 0 or at R. The next segment's memory inhibits
-       it with ``2 g E_ex / -E_inh``, which balances both excitations at 0. This begins at 0.6 R, where that memory
-       already keeps itself, so that the wave is never lost between two segments.
-    2. *The relay is a logical AND.* Its segment's memory and sensory neuron excite it with g / 2 each: both bring it to
-       R, one alone to ``R E_ex / (2 E_ex - R)``, which is 0.53 R with the papers' constants. Its synapse to the next
-       sensory neuron has the paper's g43 and opens over the middle third between these two potentials.
-    3. *A contraction that has begun goes on.* The contraction neuron inhibits its own sensory neuron, again with g43,
-       until the half-centre ends the contraction, even if the segment has not left its rest length. Such a segment
-       passes the wave on like any other.
-
-    A segment that is not back at rest length when its half-centre turns again contracts once more.
-
-    Args:
-        n_segments: Number of segments, at least 3.
-        parameters: What to design it from; default: those of the papers.
-
-    Returns:
-        A network of ``5 n_segments`` neurons; at the start segment 1 is contracted, and its memory is on.
-
-    Raises:
-        ConfigError: As `peristalsis_network`.
-    """
-    p = parameters or PeristalsisParameters()
-    network = _segments(f"waiting peristalsis of {n_segments} segments", n_segments, p, relays_joined=False)
-    reach, excitatory, inhibitory = p.range_mV, p.excitatory_reversal_mV, p.inhibitory_reversal_mV
-    through, silencing_uS = p.transmission(), p.conductances.relay_to_next_sensory
-    latch = Synapse(through.conductance_uS, excitatory, 0.4 * reach, 0.6 * reach)
-    forgetting_uS = p.cancelling_uS(2.0 * through.conductance_uS, reach)
-    forget = Synapse(forgetting_uS, inhibitory, 0.6 * reach, reach)
-    half = p.excitatory(0.5 * through.conductance_uS)
-    alone = reach * excitatory / (2.0 * excitatory - reach)
-    both = Synapse(silencing_uS, inhibitory, (2.0 * alone + reach) / 3.0, (alone + 2.0 * reach) / 3.0)
-    segments = range(1, n_segments + 1)
-    for segment in segments:
-        network.add_neuron(f"memory_{segment}", p.leaky_neuron, reach if segment == 1 else 0.0)
-    for segment in segments:
-        following = segment % n_segments + 1
-        contraction, _, sensory, relay = (f"{role}_{segment}" for role in ROLES)
-        memory = f"memory_{segment}"
-        network.add_synapse(contraction, memory, through)
-        network.add_synapse(memory, memory, latch)
-        network.add_synapse(f"memory_{following}", memory, forget)
-        network.add_synapse(memory, relay, half)
-        network.add_synapse(sensory, relay, half)
-        network.add_synapse(relay, f"sensory_{following}", both)
-        network.add_synapse(contraction, sensory, p.inhibitory(silencing_uS))
     return network

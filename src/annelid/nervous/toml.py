@@ -22,6 +22,8 @@ KINDS: dict[str, type[neurons.ConnectionKind]] = {
     "gap_junction": neurons.GapJunction,
 }
 """What a connection's ``kind`` is called in the text."""
+CIRCUIT_TABLES = ("sense", "switch", "pulse", "readout")
+"""Tables of a controller's text that are beside the network's, and no part of it."""
 GONE = {"firing", "spiking_synapse", "modulatory_synapse"}
 """What older texts may have: neurons that spike, and modulation."""
 
@@ -52,7 +54,7 @@ def network_tables(network: Wiring) -> dict[str, Any]:
 def read_network(text: str, make: type[Built]) -> Built:
     """Builds a network of the class ``make`` from TOML text."""
     document = parse_toml(text, "the network")
-    _refuse_unknown(document, {"name", "neuron", "connection", "input", "output"}, "the network")
+    _refuse_unknown(document, {"name", "neuron", "connection", "input", "output", *CIRCUIT_TABLES}, "the network")
     network = make(_string(document.get("name", "network"), "the network's name"))
     for place, entry in _tables(document, "neuron"):
         [name] = _strings(entry, place, "name")

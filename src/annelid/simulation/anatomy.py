@@ -15,7 +15,7 @@ from annelid.arena.surface import Surface
 from annelid.body.actuation import crossing_site, ring_names, stretch_sensors
 from annelid.body.worm import WormBody
 from annelid.config import ArenaKind
-from annelid.morphology import Array, MeshGeometry, heading_turn, norm
+from annelid.morphology import Array, MeshGeometry, norm
 from annelid.simulation.energies import Elasticity, EnergyMeter
 from annelid.simulation.scene_objects import Objects, add_scene_sensors, in_scene
 from annelid.simulation.skin import Skin
@@ -186,18 +186,16 @@ class Placement(NamedTuple):
 def start_placement(anatomy: Anatomy, body: WormBody) -> Placement:
     """Returns how a worm lies on its ground at the start; in the model it leads towards -x.
 
-    It is turned to its heading. If its radius differs along it, its axis is level in the model; then it leans until the
+    If its radius differs along it, its axis is level in the model; then it leans until the
     lowest points of its first and its last ring are equally high, and its own lowest point has the height z = 0.
     """
     geometry, radii, rings = anatomy.geometry, body.mesh.radii_m, anatomy.geometry.ring_planes[[0, -1]]
     if len(set(radii)) == 1:
-        if not body.heading_deg:
-            return Placement(anatomy.model.qpos0.copy(), np.eye(3))
-        return turned_placement(anatomy.model, heading_turn(body.heading_deg))
+        return Placement(anatomy.model.qpos0.copy(), np.eye(3))
     lean = atan2(radii[0] - radii[-1], float(np.diff(geometry.plane_x_m[rings])[0]))
     turn = np.array([[cos(lean), 0.0, sin(lean)], [0.0, 1.0, 0.0], [-sin(lean), 0.0, cos(lean)]])
     lowest_m = float((geometry.vertices_m @ turn[2]).min())
-    return turned_placement(anatomy.model, heading_turn(body.heading_deg) @ turn, -lowest_m)
+    return turned_placement(anatomy.model, turn, -lowest_m)
 
 
 def turned_placement(
@@ -208,8 +206,7 @@ def turned_placement(
     That is below its front end.
 
     The model lies along x, and its state at the start is that of the turned worm. So all that belongs to the body
-    (which segment and side a part of the skin is on, the grain of setae, rest lengths) is the same for all headings,
-    and one compiled model serves all of them.
+    (which segment and side a part of the skin is on, the grain of setae, rest lengths) is the same for all turns.
     """
     qpos: Array = (model.qpos0 if posture is None else posture).copy()
     # Points on three slides along the world's axes.

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TypeVar
 
 from annelid.arena.friction import set_friction
-from annelid.body.worm import worm_of
 from annelid.config import RunConfig
 from annelid.errors import ConfigError
 from annelid.protocols import State, Stateful
@@ -51,8 +50,8 @@ def adjusted(running: Simulation, before: RunConfig, after: RunConfig) -> Simula
 def _differ_in_friction_only(before: RunConfig, after: RunConfig) -> bool:
     if before.arena is None or after.arena is None or before.arena.has_setae or after.arena.has_setae:
         return False
-    # Some parts of the skin, or of a scene, have a friction of their own.
-    if after.arena.is_scene or worm_of(before).relative_friction is not None:
+    # Parts of a scene have a friction of their own.
+    if after.arena.is_scene:
         return False
     alike = before.arena.model_copy(update={"friction": after.arena.friction})
     return (before.body, alike, before.clock, before.trial) == (after.body, after.arena, after.clock, after.trial)

@@ -8,19 +8,18 @@ whoever changes a file on purpose can write another digest.
 from __future__ import annotations
 
 import hashlib
-import struct
 from pathlib import Path
 from typing import BinaryIO, Literal
 
-State = Literal["intact", "damaged", "unfinished", "absent"]
-"""What the digest says of a file: there is none ("absent"), or room for one ("unfinished"), or it was compared."""
+State = Literal["intact", "damaged", "unfinished", "old", "absent"]
+"""What the digest says of a file: there is none ("absent"), room for one ("unfinished"), one of annelid 0.2 that is not
+compared any more ("old"), or it was compared."""
 _MAGIC = b"annelid digest 2".ljust(32)
 _LENGTH = 32
 _FOOTER_LENGTH = len(_MAGIC) + _LENGTH
 _UNFINISHED = bytes(_LENGTH)
 _CHUNK = 1 << 20
 _OLD_MAGIC = b"annelid digest 1"
-_OLD_FOOTER = struct.Struct("<16sQQ32s")  # magic, bytes before the table, bytes of the table, SHA-256 of the table
 
 
 def room(end: int) -> bytes:
@@ -51,23 +50,17 @@ def examine(path: Path, *, compared: bool = True) -> State:
             return "absent"
         file.seek(place - len(_MAGIC))
         magic, digest = file.read(len(_MAGIC)), file.read(_LENGTH)
-        if magic != _MAGIC and not magic.startswith(_OLD_MAGIC):
-            return "absent"
+        if magic != _MAGIC:
+            return "old" if magic.startswith(_OLD_MAGIC) else "absent"
         if digest == _UNFINISHED:
             return "unfinished"
         if not compared:
             return "intact"
-        is_intact = _sum(file, 0, place) == digest if magic == _MAGIC else _agrees_with_table(file, magic + digest)
-        return "intact" if is_intact else "damaged"
+        return "intact" if _sum(file, 0, place) == digest else "damaged"
 
 
 def _sum(file: BinaryIO, start: int, stop: int) -> bytes:
     found = hashlib.sha256()
-    _add(found, file, start, stop)
-    return found.digest()
-
-
-def _add(found: hashlib._Hash, file: BinaryIO, start: int, stop: int) -> None:
     file.seek(start)
     while start < stop:
         chunk = file.read(min(_CHUNK, stop - start))
@@ -75,24 +68,4 @@ def _add(found: hashlib._Hash, file: BinaryIO, start: int, stop: int) -> None:
             raise OSError(5, "the file became shorter while it was read")
         found.update(chunk)
         start += len(chunk)
-
-
-def _agrees_with_table(file: BinaryIO, footer: bytes) -> bool:
-    """Compares a file of annelid 0.2 with its table, which has a sum for each variable and one for all other bytes."""
-    _, end, length, digest = _OLD_FOOTER.unpack(footer)
-    if end + length + len(footer) != file.seek(0, 2):
-        return False
-    file.seek(end)
-    table = file.read(length)
-    if hashlib.sha256(table).digest() != digest:
-        return False
-    lines = [line.split(" ") for line in table.decode("ascii").split("\n") if line]
-    extents = sorted((int(offset), int(offset) + int(length), own) for own, offset, length, name in lines if name)
-    rest, position = hashlib.sha256(), 0
-    for start, stop, own in extents:
-        if not position <= start <= stop <= end or _sum(file, start, stop).hex() != own:
-            return False
-        _add(rest, file, position, start)
-        position = stop
-    _add(rest, file, position, end)
-    return [rest.hexdigest()] == [own for own, *_, name in lines if not name]
+    return found.digest()

@@ -1,7 +1,7 @@
 """The 3D worm's energies: what its muscles have done and where it went, step by step, and what its springs store.
 
-An actuator's work in a step is the mean of its tensions at both ends times the shortening between them; what dampers,
-contacts and motors take is the mean of their powers at both ends times the step. So all of it converges in proportion
+An actuator's work in a step is the mean of its tensions at both ends times the shortening between them; what dampers
+and contacts take is the mean of their powers at both ends times the step. So all of it converges in proportion
 to the square of the step, also where power jumps up and decays slowly. What is left of the muscles' work when
 everything else is subtracted is what the integrator has taken (docs/evidence/gait.md). Forces are the engine's own:
 weight, constraints, dampers, springs, and actuators, which `discrete` takes at the end of the step to first order.
@@ -26,12 +26,11 @@ class EnergyTotals(NamedTuple):
     positive_work: Array  # what each did in the physics steps in which its work was positive, likewise
     damping_loss: Array  # what dampers have taken, ()
     constraint_loss: Array  # what contacts, their friction included, and other constraints have taken, ()
-    motor_energy: Array  # what motors have taken from their battery, (n_muscles,); zero for actuators that are none
 
     @classmethod
     def zero(cls, n_muscles: int) -> EnergyTotals:
         """Returns the totals before the first step."""
-        return cls(np.zeros(n_muscles), np.zeros(n_muscles), np.zeros(()), np.zeros(()), np.zeros(n_muscles))
+        return cls(np.zeros(n_muscles), np.zeros(n_muscles), np.zeros(()), np.zeros(()))
 
     def plus(self, step: EnergyTotals) -> EnergyTotals:
         """Returns the totals after one more step."""
@@ -44,12 +43,11 @@ class Powers(NamedTuple):
     tension: Array  # of every ring actuator, N, (n_muscles,)
     damping: float  # that dampers take, W
     constraint: float  # that contacts, their friction included, and other constraints take, W
-    motor: Array  # that motors take from their battery, W, (n_muscles,); zero for actuators that are none
 
     @classmethod
     def none(cls, n_muscles: int) -> Powers:
         """Returns those of a worm that rests."""
-        return cls(np.zeros(n_muscles), 0.0, 0.0, np.zeros(n_muscles))
+        return cls(np.zeros(n_muscles), 0.0, 0.0)
 
 
 class EnergyMeter:
@@ -62,7 +60,6 @@ class EnergyMeter:
         implicit = model.opt.integrator == int(mujoco.mjtIntegrator.mjINT_DISCRETE)
         self.slopes = rings.slopes(model) if implicit else None
         self._dof_damping = model.dof_damping.copy() if implicit and model.dof_damping.any() else None
-        self.motor_power = rings.motor_power(model)
 
     def read(self, data: mujoco.MjData, drive: Array, losses_W: Iterable[tuple[float, float]] = ()) -> Powers:
         """Returns what acts at the end of a step.
@@ -86,8 +83,7 @@ class EnergyMeter:
         damped, constrained = 0.0 - float(damper @ velocity), -float(data.qfrc_constraint @ velocity)
         for of_damper, of_constraint in losses_W:
             damped, constrained = damped + of_damper, constrained - of_constraint
-        taken = np.zeros_like(tension) if self.motor_power is None else self.motor_power(tension, -rate)
-        return Powers(tension, damped, constrained, taken)
+        return Powers(tension, damped, constrained)
 
 
 def work_in_step(time_s: float, shortening_m: Array, before: Powers, after: Powers) -> EnergyTotals:
@@ -99,7 +95,6 @@ def work_in_step(time_s: float, shortening_m: Array, before: Powers, after: Powe
         np.maximum(work, 0.0),
         np.asarray(half_s * (before.damping + after.damping)),
         np.asarray(half_s * (before.constraint + after.constraint)),
-        half_s * (before.motor + after.motor),
     )
 
 

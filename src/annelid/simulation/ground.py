@@ -33,7 +33,6 @@ class MovingGround:
         self._bodies = model.geom_bodyid[self._skin]
         self._roots = model.body_rootid[self._bodies]
         self._arena = arena
-        self._relative_friction = model.geom_friction[self._skin, 0] / arena.friction
         n_planes, data = len(geometry.plane_x_m), mujoco.MjData(model)
         mujoco.mj_kinematics(model, data)
         # What friction by the direction of sliding needs: means over crossing planes, and the one nearest at rest.
@@ -72,8 +71,7 @@ class MovingGround:
         along[1:-1] = centres[:-2] - centres[2:]
         along[0], along[-1] = centres[0] - centres[1], centres[-2] - centres[-1]
         forwards = (velocity * along[self._plane]).sum(axis=-1)
-        of_arena = np.where(forwards < 0.0, self._arena.backward_friction or 0.0, self._arena.friction)
-        return self._relative_friction * of_arena
+        return np.where(forwards < 0.0, self._arena.backward_friction or 0.0, self._arena.friction)
 
 
 def facing(normal: Array) -> Array:

@@ -36,18 +36,10 @@ def reporting(
 
         def update(simulated_s: float, wall_s: float) -> None:
             factor = (simulated_s - start_s) / wall_s if wall_s > 0 else 0.0
-            left = f"{clock_text((end_s - simulated_s) / factor)} left" if factor > 0 else ""
             text = f"simulated {simulated_s:.2f} of {end_s:g} s"
-            draw(text, simulated_s / end_s, f"{factor:.3g} x real time  {left}")
+            draw(text, simulated_s / end_s, f"{factor:.3g} x real time")
 
         yield update
-
-
-def clock_text(duration_s: float) -> str:
-    """Returns a duration as ``m:ss`` or ``h:mm:ss``."""
-    minutes, seconds = divmod(round(duration_s), 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours}:{minutes:02d}:{seconds:02d}" if hours else f"{minutes}:{seconds:02d}"
 
 
 class Interruption:

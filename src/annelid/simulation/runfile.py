@@ -16,7 +16,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from annelid.config import RunConfig
-from annelid.config.checking import GONE, present_fields
+from annelid.config.checking import gone_fields, present_fields
 from annelid.errors import ConfigError, RunFileError, UnreadableText
 from annelid.registry import Registry
 from annelid.simulation import digest
@@ -139,15 +139,13 @@ def migrated(data: xarray.Dataset) -> xarray.Dataset:
 
     Files of schema 0, those of annelid 0.1, have neither warnings nor processor time. Their configuration is valid as
     it is: fields that are newer default to what 0.1 did, guards excepted. Signals that 0.1 did not record stay absent.
-    Those up to schema 1 name no published numbers. Up to schema 6 there were fields that are gone
-    (`annelid.config.checking.GONE`); a run in which one acted says so among its warnings, and is not continued.
+    Those up to schema 1 name no published numbers. Where a field acted that is gone
+    (`annelid.config.checking.gone_fields`), the run says so among its warnings, and is not continued.
     """
     if data.attrs.get(SCHEMA, 0) < 1:
         added = {WARNINGS: ((), ""), CPU_TIME: ((), 0.0)}
         data = data.assign({name: value for name, value in added.items() if name not in data})
-    if data.attrs.get(SCHEMA, 0) < SCHEMA_VERSION:
-        data = _without_gone_fields(data)
-    return data.assign_attrs({SCHEMA: SCHEMA_VERSION})
+    return _without_gone_fields(data).assign_attrs({SCHEMA: SCHEMA_VERSION})
 
 
 def _without_gone_fields(data: xarray.Dataset) -> xarray.Dataset:
@@ -162,7 +160,7 @@ def _without_gone_fields(data: xarray.Dataset) -> xarray.Dataset:
         return data  # What is wrong with it, its reader says.
     if acted:
         told = (
-            f"{path} was {value}, a field that is gone ({GONE[path][0]}): its command does not repeat it"
+            f"{path} was {value}, a field that is gone ({gone_fields()[path]['now']}): its command does not repeat it"
             for path, value in sorted(acted.items())
         )
         data = data.assign({WARNINGS: ((), "\n".join(filter(None, (str(data[WARNINGS].values), *told))))})
@@ -180,7 +178,15 @@ def _reading(file: Path) -> Iterator[None]:
     except Exception as error:
         reason = (str(error) or type(error).__name__).splitlines()[0]
         if isinstance(error, FileNotFoundError | NotADirectoryError):
-            hint = f": {file.parent} holds no {FILE_NAME}" if file.parent.is_dir() else ""
+            within = sorted(
+                found.parent for depth in ("*", "*/*") for found in file.parent.glob(f"{depth}/{FILE_NAME}")
+            )
+            held = (
+                f"{len(within)} run{'s' * (len(within) > 1)}: name one of them, as {within[0]}"
+                if within
+                else f"no {FILE_NAME}"
+            )
+            hint = f": {file.parent} holds {held}" if file.parent.is_dir() else ""
             sentence = f"there is no run file {file}{hint}"
         elif not isinstance(error, OSError):
             sentence = f"{file} is damaged: {reason}"

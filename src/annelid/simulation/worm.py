@@ -71,7 +71,6 @@ _SIGNALS = {
         "J",
         "positive work of a ring muscle so far, none regained",
     ),
-    "motor_energy": ("energies.motor_energy", ("muscle",), "J", "electrical energy that a motor has taken so far"),
     "damping_loss": ("energies.damping_loss", (), "J", "energy lost to dampers so far"),
     "constraint_loss": (
         "energies.constraint_loss",
@@ -160,7 +159,7 @@ class WormPlant:
         data = self.data = mujoco.MjData(self.model)
         self.qpos, self.act, self.ctrl, self.warned = data.qpos, data.act, data.ctrl, data.warning.number
         self.start = start_placement(anatomy, body)
-        self.mechanics = body.formulation.mechanics(self.model, data, self.geometry, body, arena, self._step_s)
+        self.mechanics = body.formulation.mechanics(self.model, data, body, arena, self._step_s)
         self.ground = MovingGround(self.model, self.geometry, arena) if arena.has_moving_planes else None
         self.reset(0)
 
@@ -377,7 +376,6 @@ class WormPlant:
         present = {
             "edge_strain": self.mechanics.edge_strain() is not None,
             "pin_gap": self.mechanics.pin_gap_m() is not None,
-            "motor_energy": anatomy.energy_meter.motor_power is not None,
         }
         signals = (
             Signal(name, dims, np.shape(self._value(path)), units, words, name in _FRAME_SIGNALS)
@@ -405,7 +403,7 @@ class WormPlant:
             "engine": engine,
             "control_step": np.array([self._control_step]),
             "muscle_force": self._powers.tension.copy(),
-            "powers": np.array([self._powers.damping, self._powers.constraint, *self._powers.motor]),
+            "powers": np.array([self._powers.damping, self._powers.constraint]),
             "contact_force": self._contact_N.copy(),
             "extremes": np.array([self._edge_strain, self._pin_gap_m]),
             **{name: np.array(total) for name, total in self.energies._asdict().items()},
@@ -421,9 +419,7 @@ class WormPlant:
         self.mechanics.set_state(state)
         self._control_step = int(state["control_step"][0])
         self._edge_strain, self._pin_gap_m = np.asarray(state["extremes"], dtype=float)
-        damping, constraint, *motor = np.asarray(state["powers"], dtype=float).tolist()
-        tension = np.array(state["muscle_force"], dtype=float)
-        self._powers = Powers(tension, damping, constraint, np.array(motor))
+        self._powers = Powers(np.array(state["muscle_force"], dtype=float), *np.asarray(state["powers"]).tolist())
         self._encounter = NO_ENCOUNTER
         if self._is_scene:
             self._encounter = NO_ENCOUNTER._replace(force=np.array(state["object_force"], dtype=float))

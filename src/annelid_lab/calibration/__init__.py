@@ -8,10 +8,12 @@ frame (`frame`) is also used alone.
 from annelid_lab.calibration.frame import (
     Loop,
     cable_force,
+    cable_per_diameter,
     draw_loops,
     frame_table,
     load_frame,
     read_loop,
+    size_of,
     write_loop,
 )
 from annelid_lab.calibration.report import Identified, identify, tables, write_identified
@@ -25,12 +27,14 @@ __all__ = [
     "Loop",
     "Simulations",
     "cable_force",
+    "cable_per_diameter",
     "draw_loops",
     "frame_table",
     "identify",
     "load_frame",
     "load_identify_study",
     "read_loop",
+    "size_of",
     "tables",
     "write_identified",
     "write_loop",

@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import resources
-from math import inf
+from math import inf, pi, sin
 from pathlib import Path
 from typing import Any
 
@@ -34,8 +34,10 @@ from annelid.textfiles import read_text
 
 MEASURED = "segment_load_frame.csv"
 MM = 1e-3
-DIAMETERS_M = np.arange(10.0, 101.0, 10.0) * MM
-"""Changes of diameter at which loops are tabulated."""
+MEASURED_RADIUS_M = 0.16
+"""Radius of the robot whose segment was measured; other worms are wound in proportion."""
+DISPLACEMENT_M, SPEED_M_PER_S = 0.33, 0.01
+"""How far and how fast the cable of the robot was wound."""
 CABLE_N_PER_M = 20_000.0
 """Stiffness of the cable: 15 N stretch it by less than a millimetre."""
 SETTLE_S = 2.0
@@ -144,11 +146,22 @@ def cable_force(loop: Loop, friction: float) -> Loop:
     return Loop(loop.displacement_m, factor * loop.force_N)
 
 
+def size_of(config: RunConfig) -> float:
+    """Returns how large a 3D worm's middle ring is over that of the robot that was measured.
+
+    Raises:
+        ConfigError: The body is no 3D worm.
+    """
+    mesh = worm_of(config).mesh
+    return mesh.radii_m[mesh.n_segments // 2] / MEASURED_RADIUS_M
+
+
 def load_frame(
     config: RunConfig,
     *,
-    displacement_m: float = 0.33,
-    speed_m_per_s: float = 0.01,
+    displacement_m: float | None = None,
+    diameter_share: float | None = None,
+    speed_m_per_s: float | None = None,
     haste: float = 8.0,
     progress: Callable[[float], object] | None = None,
 ) -> Loop:
@@ -156,8 +169,9 @@ def load_frame(
 
     Args:
         config: A 3D worm; its arena, controller and the forces of its rings have no part in this.
-        displacement_m: How far the cable is wound, m.
-        speed_m_per_s: Speed of the cable, m/s.
+        displacement_m: How far the cable is wound, m; by default as on the robot, in proportion to the radius.
+        diameter_share: The same as a share of the ring's settled length, and so of its diameter.
+        speed_m_per_s: Speed of the cable, m/s; by default likewise.
         haste: The loop is simulated so many times as fast, with every viscous coefficient of the body divided by as
             much: the same viscous forces, and the same result as long as inertia plays no part.
         progress: Called with the share of the loop that is done.
@@ -170,7 +184,8 @@ def load_frame(
         ConfigError: The body is no 3D worm, or displacement, speed or haste is out of range.
         SimulationStopped: The ring buckled, or the engine gave up.
     """
-    body = worm_of(config)
+    body, size = worm_of(config), size_of(config)
+    speed_m_per_s = SPEED_M_PER_S * size if speed_m_per_s is None else speed_m_per_s
     if not (0.0 < speed_m_per_s < np.inf and 1.0 <= haste < np.inf):
         raise ConfigError(f"speed = {speed_m_per_s:g} m/s must be greater than 0, and haste = {haste:g} at least 1")
     model, tendons, corners = _compiled(_sped_up(config, body, haste), body)
@@ -178,10 +193,12 @@ def load_frame(
     _steps(model, data, round(SETTLE_S / model.opt.timestep))
     _locate(model, data)
     start = data.ten_length[tendons].copy()
+    if displacement_m is None:
+        displacement_m = DISPLACEMENT_M * size if diameter_share is None else diameter_share * float(start.sum())
     if not 0.0 < displacement_m < 0.8 * start.sum():
         raise ConfigError(
             f"displacement = {displacement_m:g} m must be greater than 0 and less than {0.8 * start.sum():.3g} m, "
-            "four fifths of the ring"
+            "four fifths of the ring: set a smaller displacement, or a diameter share below 0.8"
         )
     wanted = displacement_m / (haste * speed_m_per_s) / model.opt.timestep
     if wanted > MOST_STEPS:
@@ -277,23 +294,37 @@ def gave_way(corners_m: np.ndarray, tension_N: np.ndarray) -> str | None:
     return None
 
 
-def frame_table(loops: Mapping[str, Loop]) -> Table:
-    """Tabulates loops side by side: force on both branches, peak, and the share of the work that is lost."""
+def cable_per_diameter(config: RunConfig) -> float:
+    """Returns how far a cable is wound for a change of diameter: the ring is a polygon of its crossings, 3 for six."""
+    corners = worm_of(config).mesh.n_helices // 2
+    return corners * sin(pi / corners)
+
+
+def frame_table(loops: Mapping[str, Loop], per_diameter: float) -> Table:
+    """Tabulates loops side by side: force on both branches, peak, and the share of the work that is lost.
+
+    Rows divide the change of diameter that the first loop reaches.
+
+    Args:
+        loops: The loops by their names.
+        per_diameter: As `cable_per_diameter` gives it.
+    """
     table = Table("diameter change (mm)", title="load frame: force of the cable, wound in / let out (N)")
+    step = float(next(iter(loops.values())).displacement_m.max()) / 33
     columns = []
     for name, loop in loops.items():
         table.add_column(name, justify="right")
-        reached = np.arange(10 * MM, loop.displacement_m.max() - 5 * MM, 10 * MM)
+        reached = np.arange(step, loop.displacement_m.max() - step / 2, step)
         columns.append(loop.branches(reached)[:, 2::3] if len(reached) > 1 else np.empty((2, 0)))
-    for row, diameter in enumerate(DIAMETERS_M):
-        cells = [f"{c[0, row]:.2f} / {c[1, row]:.2f}" if row < c.shape[1] else "" for c in columns]
-        table.add_row(f"{diameter / MM:.0f}", *cells)
-    table.add_row("peak (N)", *(f"{loop.force_N.max():.2f}" for loop in loops.values()))
+    for row in range(10):
+        cells = [f"{c[0, row]:.3g} / {c[1, row]:.3g}" if row < c.shape[1] else "" for c in columns]
+        table.add_row(f"{(row + 1) * 3 * step / per_diameter / MM:.3g}", *cells)
+    table.add_row("peak (N)", *(f"{loop.force_N.max():.3g}" for loop in loops.values()))
     table.add_row("work lost", *(f"{loop.lost_share():.1%}" for loop in loops.values()))
     return table
 
 
-def draw_loops(loops: Mapping[str, Loop], stem: Path) -> Path:
+def draw_loops(loops: Mapping[str, Loop], stem: Path, per_diameter: float) -> Path:
     """Draws loops over one another, the first in front, as ``.svg`` and ``.png``; returns the path of the latter."""
     with canvas(3.6) as figure:
         axes = figure.subplots()
@@ -301,7 +332,7 @@ def draw_loops(loops: Mapping[str, Loop], stem: Path) -> Path:
         draw_lines(axes, lines, markers=False)
         for order, line in enumerate(axes.lines):
             line.set(zorder=3 - order, linewidth=0.9 if order else 1.6)
-        displacement = "displacement of the cable (mm); a third of it is the change of diameter"
+        displacement = f"displacement of the cable (mm), {per_diameter:.3g} times the change of diameter"
         axes.set(xlabel=displacement, ylabel="force of the cable (N)")
         axes.legend(loc="upper left")
         return save_both(figure, stem)

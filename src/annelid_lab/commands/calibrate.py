@@ -13,7 +13,6 @@ from annelid.cli import (
     Jobs,
     Output,
     Quiet,
-    SchedulerAddress,
     command,
     complain,
     kept_runs,
@@ -40,7 +39,6 @@ def calibrate_command(
         typer.Option(metavar="PARAMETER", help="Fit only these; may be repeated.  [default: those of the study]"),
     ] = None,
     jobs: Jobs = None,
-    scheduler: SchedulerAddress = None,
     example: Annotated[
         bool, typer.Option("--example", help="Print the study of the authors' robot, as a start for your own.")
     ] = False,
@@ -82,7 +80,7 @@ def calibrate_command(
     loaded = load_identify_study(source)
     loaded = loaded.model_copy(update={"set": {**loaded.set, **overrides_of(assignments)}})
     loaded = loaded.only(free) if free else loaded
-    with kept_runs(output, jobs=jobs, scheduler=scheduler, quiet=quiet) as store:
+    with kept_runs(output, jobs=jobs, quiet=quiet) as store:
         refuse_existing(output / REPORT, force)
         simulations = Simulations(store.folder, store.executor, store.progress)
         found = identify(loaded, source.parent, simulations, lambda note: complain(f"note: {note}"))

@@ -37,7 +37,6 @@ def compare_command(
         Path | None,
         typer.Option("--output", "-o", help="Folder for the figures and comparison.json  [default: only print]"),
     ] = None,
-    potentials: Annotated[bool, typer.Option("--potentials", help="Draw the potentials of the neurons too.")] = False,
     view: Annotated[
         bool, typer.Option("--view", help="With --map: play the run in the browser, with the log beside it.")
     ] = False,
@@ -47,7 +46,7 @@ def compare_command(
 
     Prints the numbers of every run with their differences to the first, and the fields in which the configurations
     differ. A dash means that the run lacks the number, so worms of any kinds can be compared. With -o it draws all runs
-    into one figure each: lengths.png, travel.png, and potentials.png with --potentials.
+    into one figure each: lengths.png and travel.png.
 
     \b
     annelid compare runs/riddle2023-rods-001 runs/riddle2023-rods-002
@@ -78,7 +77,7 @@ def compare_command(
     if view:
         raise typer.BadParameter("--view needs --map: annelid view RUN plays a run alone")
     from annelid.analysis import compare
-    from annelid.draw import comparison_table, fields_table, lengths_figure, potentials_figure, travel_figure
+    from annelid.draw import comparison_table, fields_table, lengths_figure, travel_figure
     from annelid.output import write_json
     from annelid.simulation import open_run
     from annelid.terminal import Console
@@ -87,11 +86,7 @@ def compare_command(
         _propose_map(*runs)
     if len(runs) < 2:
         raise typer.BadParameter("name at least two runs to compare")
-    if potentials and output is None:
-        raise typer.BadParameter("--potentials draws a figure, so it needs a folder: -o FOLDER")
     figures = {"lengths.png": lengths_figure, "travel.png": travel_figure}
-    if potentials:
-        figures["potentials.png"] = potentials_figure
     if output is not None:
         lock(output)
         for name in ("comparison.json", *figures):

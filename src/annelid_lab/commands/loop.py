@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 _LINE = "a serial port as PORT@BAUD, or udp:HOST:PORT"
 Ticks = Annotated[
     tuple[int, int],
-    typer.Option(metavar="RELAXED CONTRACTED", help="Servo positions at activation 0 and 1, from 0 to 4095."),
+    typer.Option(metavar="RELAXED CONTRACTED", help="Servo positions at activation 0 and 1; a turn has 4096 steps."),
 ]
 Potentiometer = Annotated[
     tuple[float, float],
@@ -48,9 +48,7 @@ def loop_command(
     ] = None,
     servos: Annotated[
         str | None,
-        typer.Option(
-            metavar="LINE", help="A robot of servos with the protocol Dynamixel 2.0: a serial port as PORT@BAUD."
-        ),
+        typer.Option(metavar="LINE", help="A robot of Dynamixel servos: a serial port as PORT@BAUD."),
     ] = None,
     firmware: Annotated[
         str | None, typer.Option(metavar="LINE", help=f"A controller that speaks annelid's protocol: {_LINE}.")
@@ -71,6 +69,8 @@ def loop_command(
     ] = None,
     ticks: Ticks = _TICKS,
     potentiometer: Potentiometer = _POTENTIOMETER,
+    protocol: Annotated[int, typer.Option(min=1, max=2, help="Protocol of the servos, 1.0 or 2.0.")] = 2,
+    wheel: Annotated[bool, typer.Option("--wheel", help="Servos turn without end: positions become speeds.")] = False,
     assignments: Assignments = None,
     segments: Segments = None,
     duration: Annotated[float | None, typer.Option(help="Time to run, s.")] = None,
@@ -103,14 +103,16 @@ def loop_command(
 
     config = config_of(preset, overrides_of(assignments, duration_s=duration), segments)
     limits = Limits(least, most, math.inf if most_rate is None else most_rate)
-    wiring = Wiring(*ticks, *potentiometer)
+    wiring = Wiring(*ticks, *potentiometer, protocol, wheel)
     has_servos = servos is not None or pseudo
     if robot is None and firmware is None and not has_servos:
         raise typer.BadParameter("name what is real: --robot, --servos or --firmware; else --pseudo, or annelid run")
     if servos is not None and pseudo:
         raise typer.BadParameter("--pseudo stands for a robot of servos: leave out --servos")
-    if not has_servos and (ticks, potentiometer) != (_TICKS, _POTENTIOMETER):
-        raise typer.BadParameter("--ticks and --potentiometer are of a robot of servos: they need --servos")
+    if not has_servos and wiring != Wiring():
+        raise typer.BadParameter(
+            "--ticks, --potentiometer, --protocol and --wheel are of a robot of servos: they need --servos"
+        )
     if robot is None and not has_servos and (least, most, most_rate) != (0.0, 1.0, None):
         raise typer.BadParameter("--least, --most and --most-rate are limits of a robot: they need --robot or --servos")
     lines = {name: text for name, text in (("robot", robot), ("servos", servos), ("firmware", firmware)) if text}

@@ -51,7 +51,8 @@ def export_network_command(
           its outputs.
     lems  LEMS, the language of NeuroML 2, for pyLEMS and jNeuroML: the
           network alone
-    toml  the network alone, as Network.to_toml writes it
+    toml  the network as text; of a preset with its senses and readout, as
+          annelid run --network takes it
 
     \b
     annelid export-network riddle2022-planar -o firmware
@@ -63,6 +64,7 @@ def export_network_command(
     from typing import cast
 
     from annelid.config import preset_names
+    from annelid.control import CircuitController, circuit_text
     from annelid.nervous import Network, Scheme
     from annelid.output import with_suffix, write_text
     from annelid.simulation import build_controller, build_plant
@@ -102,7 +104,7 @@ def export_network_command(
     if to != "c":
         refuse_existing(target, force)
         text = (
-            network.to_toml()
+            (circuit_text(worm.circuit) if isinstance(worm, CircuitController) else network.to_toml())
             if to == "toml"
             else lems_text(network, timestep_ms=0.1 if timestep_ms is None else timestep_ms)
         )

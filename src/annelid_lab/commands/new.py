@@ -24,17 +24,28 @@ def new_command(
     rear_radius: Annotated[
         float | None, typer.Option(help="Radius of the last ring at rest, m  [default: --radius, no taper]")
     ] = None,
+    segment_length: Annotated[
+        float | None, typer.Option(help="Distance of two rings at rest, m, in place of --length")
+    ] = None,
+    strand_radius: Annotated[
+        float | None, typer.Option(help="Radius of the strands, m, taken as solid  [default: in proportion]")
+    ] = None,
+    young_modulus: Annotated[
+        float | None, typer.Option(help="Young's modulus of the strands, Pa  [default: by their weight]")
+    ] = None,
     force: Force = False,
 ) -> None:
     """Write the configuration of a worm of your own size.
 
     Strands, springs, muscles, sensors, times and limits follow from the geometry, so that the worm moves as
     riddle2023-rods does. The file states the rule of each number. Replace what you can measure. A geometry that cannot
-    work is refused.
+    work is refused. With the radius and the modulus of your own strands, springs and forces follow them.
 
     \b
     annelid new mine.toml --radius 0.05 --segments 5 --helices 8 --length 0.4
     annelid new taper.toml --radius 0.05 --rear-radius 0.04
+    annelid new tube.toml --radius 0.05 --segment-length 0.07
+    annelid new tube.toml --strand-radius 0.003 --young-modulus 2.2e8
     annelid run mine.toml
     """
     from annelid.output import write_text
@@ -43,4 +54,5 @@ def new_command(
     if path.suffix != ".toml":
         raise typer.BadParameter(f"{path} must end in .toml")
     refuse_existing(path, force, "")
-    print_paths([write_text(path, worm_text(radius, segments, helices, length, rear_radius))])
+    text = worm_text(radius, segments, helices, length, rear_radius, segment_length, strand_radius, young_modulus)
+    print_paths([write_text(path, text)])

@@ -109,7 +109,7 @@ def _circuit_of(controller: Controller) -> CircuitController:
     if not isinstance(inner, CircuitController):
         raise ConfigError(
             f"{getattr(controller, 'name', type(controller).__name__)} cannot be exported: only controllers that step "
-            "a network can (sns, adaptive, sns-pressure, sns-waiting, sns-robust, and every other circuit)"
+            "a network can (sns, adaptive, sns-pressure, sns-robust, and every other circuit)"
         )
     return inner
 

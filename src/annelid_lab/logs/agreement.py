@@ -161,10 +161,12 @@ def compare_series(series: Mapping[str, tuple[Array, Array, str]], log: Measured
     if overlap.stop - overlap.start < 20:
         raise ConfigError(f"log and run do not overlap at lag_s = {shown(log.log_map.lag_s)}")
     measured, simulated_here, time_s = theirs[:, of_log].copy(), ours[:, overlap], grid[overlap]
-    for row, column in enumerate(log.columns.values()):
+    for row, (name, column) in enumerate(log.columns.items()):
+        seen = np.isfinite(measured[row])
         if column.offset == "free":
-            seen = np.isfinite(measured[row])
             measured[row] += simulated_here[row, seen].mean() - measured[row, seen].mean()
+        if column.signal == "travel" and seen.any() and measured[row, seen][-1] < measured[row, seen][0]:
+            notes.append(f"{name} goes backward: if the robot walks to where it falls, write scale = -1 for it")
 
     periods = (period(theirs) * step_s, period(ours) * step_s)
     ratio = periods[0] / periods[1]

@@ -36,9 +36,18 @@ class Column(Section):
     )
     scale: float | None = Field(default=None, description="SI units of the signal in one of the column's, as m per rad")
     offset: float | Literal["free"] = Field(
-        default=0.0, description="added to the column, in the signal's SI unit; free: means are made equal"
+        default=0.0,
+        description="added to the column, in the signal's SI unit; free, also of travel: means are made equal",
     )
     distance_to: Line | None = Field(default=None, description="another tracked point: the column is their distance")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _from_any_place(cls, given: object) -> object:
+        """Frees the offset of travel, since a log may count places from anywhere."""
+        if not isinstance(given, Mapping) or given.get("signal") != "travel":
+            return given
+        return {"offset": "free", **given}
 
 
 class LogMap(Section):
@@ -81,13 +90,14 @@ def read_map(path: str | Path) -> LogMap:
     return read
 
 
-def unit_of(name: str, given: str | None, what: str) -> tuple[str, float]:
+def unit_of(name: str, given: str | None, what: str, example: str = "mm") -> tuple[str, float]:
     """Returns what a column measures, by its SI unit, and how many of these its unit is.
 
     Args:
         name: The column's name, which may end in the unit.
         given: The unit, where it is stated.
         what: What states it, for the error.
+        example: A unit that would fit, for the error.
 
     Raises:
         ConfigError: The unit is unknown, or there is none.
@@ -99,7 +109,8 @@ def unit_of(name: str, given: str | None, what: str) -> tuple[str, float]:
     if given:
         raise ConfigError(f"{what} = {shown(given)} is no known unit: it is one of {listed(list(UNITS))}")
     raise ConfigError(
-        f'the unit of column {shown(name)} is not known: end its name in one, as _mm, or write {what} = "mm"'
+        f"the unit of column {shown(name)} is not known: end its name in one, as _{example}, or write "
+        f'{what} = "{example}" in the map'
     )
 
 

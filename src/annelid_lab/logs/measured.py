@@ -16,7 +16,7 @@ import pandas
 
 from annelid.errors import ConfigError, UnreadableText, shown, suggest
 from annelid.protocols import Array
-from annelid_lab.logs.maps import Column, LogMap, unit_of
+from annelid_lab.logs.maps import UNITS, Column, LogMap, plain_unit, unit_of
 from annelid_lab.logs.tables import LogTable, read_table, several
 
 OUTLIER = 1.5
@@ -104,17 +104,36 @@ def outliers(series: Array) -> np.ndarray:
     return far & (np.bincount(after, minlength=len(far) + 1)[after] <= 3)
 
 
+def _form(name: str) -> re.Pattern[str]:
+    """What finds the columns of a tracked point, as ``worm1.head.x``, ``head_y_mm`` or ``X#head (cm)``."""
+    words = "|".join(("x", "y", "z", *_CERTAINTY))
+    return re.compile(
+        rf"(?:(?P<who>.+)[.:])?(?:(?P<name>{name})[._: ](?P<axis>{words})|(?P<first>[xyz])[#._ ](?P<after>{name}))"
+        r"(?:[_ (\[]+(?P<unit>[A-Za-zµμ]+)[)\]]?)?",
+        re.IGNORECASE,
+    )
+
+
+_ANY_POINT = _form(".+?")
+
+
+def point_in(column: str) -> str | None:
+    """Returns the name of the tracked point that a column has a coordinate or the certainty of; None for another."""
+    match = _ANY_POINT.fullmatch(column)
+    name = match and (match["name"] or match["after"])
+    return None if not name or UNITS.get(plain_unit(name), ("",))[0] in ("m", "px") else name
+
+
 def points_of(name: str, names: Sequence[str]) -> dict[str, dict[str, str]]:
     """Finds a tracked point among columns: the column of each coordinate and of the certainty, by individual."""
-    words = "|".join(("x", "y", "z", *_CERTAINTY))
-    form = re.compile(rf"(?:(.+)[.:])?{re.escape(name)}[._: ]({words})(?:[_ (\[]+[A-Za-zµμ]+[)\]]?)?", re.IGNORECASE)
+    form = _form(re.escape(name))
     found: dict[str, dict[str, str]] = {}
     for column in names:
         if match := form.fullmatch(column):
-            axes = found.setdefault(match[1] or "", {})
-            if match[2].lower() in axes:
+            axes, axis = found.setdefault(match["who"] or "", {}), (match["axis"] or match["first"]).lower()
+            if axis in axes:
                 return {}
-            axes[match[2].lower()] = column
+            axes[axis] = column
     return {individual: axes for individual, axes in found.items() if {"x", "y"} <= axes.keys()}
 
 
@@ -149,15 +168,16 @@ def _place(name: str, table: LogTable, log_map: LogMap) -> tuple[Array, str | No
     if log_map.individual is not None:
         points = {who: axes for who, axes in points.items() if who in ("", log_map.individual)}
     if not points:
-        raise ConfigError(f"{table.path} has no column {shown(name)}: {suggest(name, table.names)}")
+        known = {point_in(one) or one for one in table.names}
+        raise ConfigError(f"{table.path} has no column {shown(name)}: {suggest(name, known)}")
     if len(points) > 1:
         raise UnreadableText(several(table.path, sorted(points)))
     (axes,) = points.values()
     place = np.stack([table.numbers(axes[axis]) for axis in "xyz" if axis in axes], axis=1)
     for word in axes.keys() & set(_CERTAINTY):
         place[~(table.numbers(axes[word]) >= log_map.least_likelihood)] = np.nan
-    end = re.search(r"[xyz][_ (\[]+([A-Za-zµμ]+)[)\]]?$", axes["x"], re.IGNORECASE)
-    return place, table.units.get(axes["x"]) or (end[1] if end else None)
+    end = _form(re.escape(name)).fullmatch(axes["x"])
+    return place, table.units.get(axes["x"]) or (end and end["unit"])
 
 
 def _instants(table: LogTable, log_map: LogMap) -> tuple[Array, np.ndarray]:
@@ -169,7 +189,8 @@ def _instants(table: LogTable, log_map: LogMap) -> tuple[Array, np.ndarray]:
         raise ConfigError(f"{table.path} has no column {shown(log_map.time)}: {offered}")
     time_s = clock_times(log_map.time, table)
     if time_s is None:
-        kind, factor = unit_of(log_map.time, log_map.time_unit or table.units.get(log_map.time), "time_unit")
+        given = log_map.time_unit or table.units.get(log_map.time)
+        kind, factor = unit_of(log_map.time, given, "time_unit", example="s")
         if kind != "s":
             unit = log_map.time_unit or log_map.time
             raise ConfigError(f"time_unit = {shown(unit)} is no unit of time: s, ms, us or min")

@@ -8,18 +8,24 @@ from pathlib import Path
 
 from annelid.textfiles import toml_value
 from annelid_lab.logs.maps import UNIT_AT_END, UNITS, plain_unit
-from annelid_lab.logs.measured import clock_times, points_of
+from annelid_lab.logs.measured import clock_times, point_in, points_of
 from annelid_lab.logs.tables import LogTable, read_table
 
 _SPELT_OUT = {"seconds": "s", "milliseconds": "ms", "meters": "m", "centimeters": "cm", "millimeters": "mm"}
-_TIME = re.compile(r"t|times?|zeit|timestamps?|clock|elapsed|date|date.?time|seconds|millis", re.IGNORECASE)
-_SEGMENT = re.compile(
-    r"(?:.*[_ .])?(?:s|seg|segment|spring|stretch|sensor|len|length|l)[_ ]?(\d+)(?:[_ ]?(left|right|l|r|mean|avg))?",
+_TIME = re.compile(
+    r"t|(?:elapsed|log|run|sim)?[_ ]?times?|zeit|timestamps?|clock|elapsed|date|date.?time|seconds|millis|micros",
     re.IGNORECASE,
 )
-_TRAVEL = re.compile(r"travel|distance|displacement|forward", re.IGNORECASE)
+_CLOCKS = {"millis": "ms", "micros": "us", "seconds": "s"}
+"""Names of times that are units, as those of Arduino's functions."""
+_SEGMENT = re.compile(
+    r"(?:.*[_ .])?(?:s|seg|segment|spring|stretch|sensor|len|length|l|(pot|adc|analog|a|raw|counts?))[_ ]?(\d+)"
+    r"(?:[_ ]?(?:length|len|stretch))?(?:[_ ]?(left|right|l|r|mean|avg))?",
+    re.IGNORECASE,
+)
+"""A segment's sensor: whether it gives counts, the number, and the side."""
+_TRAVEL = re.compile(r"travel|distance|displacement|forward|position|x", re.IGNORECASE)
 _SIDES = {"l": "left", "left": "left", "r": "right", "right": "right"}
-_POINT = re.compile(r"(?:.+[.:])?(.+?)[._: ]x(?:[_ (\[]+[A-Za-zµμ]+[)\]]?)?", re.IGNORECASE)
 _RATE = re.compile(r"(?:frame rate|frequency|fps)\W+(\d+(?:\.\d+)?)|^Trajectories\s+(\d+(?:\.\d+)?)", re.IGNORECASE)
 _LENGTH_UNIT = re.compile(r"length units\W+(meters|centimeters|millimeters)", re.IGNORECASE)
 
@@ -46,7 +52,8 @@ def proposed_map(path: Path) -> tuple[str, list[str]]:
     time = next((name for name in table.names if _TIME.fullmatch(_split_unit(name, table)[0].rpartition(".")[2])), None)
     if time is not None:
         lines += [f"time = {toml_value(time)}"]
-        unit, is_stated = _split_unit(time, table)[1:]
+        base, unit, is_stated = _split_unit(time, table)
+        unit = unit or _CLOCKS.get(base.lower())
         if unit and not is_stated:
             lines += [f'time_unit = "{unit}"']
         elif not unit and clock_times(time, table) is None:
@@ -95,18 +102,24 @@ def _points_entries(
 def _signals_entries(names: Sequence[str], table: LogTable) -> tuple[list[str], list[str]]:
     """Entries of the columns that are no points, and whose unit is yet to be stated."""
     found = {name: _SEGMENT.fullmatch(_split_unit(name, table)[0]) for name in names}
-    from_0 = any(match and int(match[1]) == 0 for match in found.values())
+    from_0 = any(match and int(match[2]) == 0 for match in found.values())
     entries, missing = (["# Segments are numbered from 0 in the log, from 1 in annelid."] if from_0 else []), []
     for name in names:
         base, unit, is_stated = _split_unit(name, table)
         if match := found[name]:
-            signal = f"stretch_length[{int(match[1]) + from_0}, {_SIDES.get((match[2] or '').lower(), 'mean')}]"
+            signal = f"stretch_length[{int(match[2]) + from_0}, {_SIDES.get((match[3] or '').lower(), 'mean')}]"
         elif _TRAVEL.fullmatch(base):
             signal = "travel"
         else:
             entries += [f'# {toml_value(name)} = ""   # not recognised']
             continue
-        if unit is None:
+        if unit is None and match and match[1]:
+            entry = f'signal = "{signal}", unit = "1", offset = "free"'
+            entries += [
+                f"{toml_value(name)} = {{ {entry} }}   # scale = 0.0001? metres in a count: the log does not say"
+            ]
+            missing += [f"scale, the metres in a count, of {toml_value(name)}"]
+        elif unit is None:
             entries += [f'{toml_value(name)} = {{ signal = "{signal}" }}   # unit = "mm"? the log does not say']
             missing += [f"the unit of {toml_value(name)}"]
         elif is_stated:
@@ -120,16 +133,16 @@ def _names_in(names: Sequence[str]) -> int:
     """How good a header is: texts that differ, and coordinates that have the names of their points."""
     if len(set(names)) < len(names):
         return 0
-    return sum(bool(re.search(r"[^\W\d]", name)) + bool(_POINT.fullmatch(name)) for name in names)
+    return sum(bool(re.search(r"[^\W\d]", name)) + bool(point_in(name)) for name in names)
 
 
 def _points_in(table: LogTable) -> dict[str, tuple[list[str], str | None]]:
     """Tracked points: the individuals that have each, and its unit where a column or a row of units says so."""
     found: dict[str, tuple[list[str], str | None]] = {}
-    for match in filter(None, map(_POINT.fullmatch, table.names)):
-        if match[1] not in found and (axes := points_of(match[1], table.names)):
+    for point in dict.fromkeys(filter(None, map(point_in, table.names))):
+        if axes := points_of(point, table.names):
             _, unit, is_stated = _split_unit(next(iter(axes.values()))["x"], table)
-            found[match[1]] = sorted(axes), unit if is_stated else None
+            found[point] = sorted(axes), unit if is_stated else None
     return found
 
 

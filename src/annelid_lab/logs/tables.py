@@ -215,6 +215,8 @@ def _header(head: Sequence[Names], score: Score, path: Path) -> tuple[int, int, 
         own = [cell.strip() for cell in row]
         if own and own[0][:1] in ("#", "%"):
             own = [own[0].lstrip("#% "), *own[1:]] if own[0].lstrip("#% ") else own[1:]
+        if all(_NUMBER.fullmatch(cell) for cell in own):
+            continue
         above = [_filled(other) for other in reversed(head[max(place - 5, 0) : place]) if len(other) == len(row)]
         # The row alone, below one other, or below two neighbours, as individuals over points.
         for rows in ((), *((one,) for one in above), *zip(above[1:], above, strict=False)):
@@ -409,8 +411,11 @@ def _equally_long(found: Mapping[str, object], path: Path) -> DataFrame:
     longest = max(map(len, vectors.values()), default=0)
     if not longest:
         matrix = next((name for name, one in arrays.items() if one.ndim == 2), None)
-        remedy = f": {shown(matrix)} is a matrix without names, save its columns as variables" if matrix else ""
-        raise UnreadableText(f"{path} has no vector of numbers{remedy}")
+        found_one = f"{shown(matrix)} is a matrix without names: " if matrix else ""
+        raise UnreadableText(
+            f"{path} has no vector of numbers: {found_one}save each column as its own variable, as in "
+            "t = data(:, 1), or a table T as S = table2struct(T, 'ToScalar', true)"
+        )
     return DataFrame({name: one.astype(float) for name, one in vectors.items() if len(one) == longest})
 
 

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import struct
 import time
 from collections import deque
 from collections.abc import Callable
 
 import numpy as np
 
+from annelid_lab.loop.dynamixel import PROTOCOLS, SYNC_WRITE, WATCHDOG_UNIT_S, PacketDecoder, Register
 from annelid_lab.loop.links import MOST_READ
-from annelid_lab.loop.servos import WATCHDOG_UNIT_S, Instruction, PacketDecoder, Register, Wiring, packet
+from annelid_lab.loop.servos import MOST_SPEED, Wiring
 
 REACH_M = 0.06
 """Lengthening of a segment that is contracted fully."""
@@ -38,6 +38,7 @@ class PseudoRobot:
         *,
         lag_s: float = 0.15,
         noise_m: float = 0.0005,
+        latency_s: float = LATENCY_S,
         wiring: Wiring | None = None,
         clock: Callable[[], float] = time.perf_counter,
         sleep: Callable[[float], None] = time.sleep,
@@ -49,20 +50,23 @@ class PseudoRobot:
             n_muscles: Servos, one or two per segment.
             lag_s: Time constant of a servo with its segment, s.
             noise_m: Standard deviation of a potentiometer's noise, m.
-            wiring: Positions and counts.
+            latency_s: Time from a packet to its answer, s.
+            wiring: Positions and counts, protocol and mode.
             clock: Time that never goes back, s.
             sleep: Waits so many seconds.
         """
         self.wiring = wiring or Wiring()
         self._n_segments, self._servos = n_segments, range(1, n_muscles + 1)
         self._lag_s, self._noise_m, self._rng = lag_s, noise_m, np.random.default_rng(0)
-        self._decoder = PacketDecoder()
+        self._bus = PROTOCOLS[self.wiring.protocol]
+        self._decoder, self._latency_s = PacketDecoder(self._bus), latency_s
         self._clock, self._sleep = clock, sleep
         self._now_s = self._last_packet_s = clock()
         self._answers: deque[tuple[float, bytes]] = deque(maxlen=1024)
         self.position = np.full(n_muscles, float(self.wiring.relaxed))
         self._table = {register: np.zeros(n_muscles, dtype=np.int64) for register in Register}
         self._table[Register.GOAL][:] = self.wiring.relaxed
+        self._table[Register.MOST_SPEED][:] = MOST_SPEED
         self._watchdog_ended = np.zeros(n_muscles, dtype=bool)
 
     @property
@@ -73,9 +77,9 @@ class PseudoRobot:
     def send(self, data: bytes) -> None:
         """Takes bytes from the bus, as `Link.send`."""
         self._move()
-        for _, instruction, parameters in self._decoder.feed(data):
+        for servo, instruction, parameters in self._decoder.feed(data):
             self._last_packet_s = self._now_s
-            self._execute(instruction, parameters)
+            self._execute(servo, instruction, parameters)
 
     def receive(self, timeout_s: float) -> bytes:
         """Returns what the servos have answered by now, as `Link.receive`."""
@@ -103,24 +107,27 @@ class PseudoRobot:
         self._watchdog_ended |= (patience_s > 0) & (now_s - self._last_packet_s > patience_s)
         # A servo whose watchdog has ended the session stays where it is, and takes no goal until that is written as 0.
         moves = (self._table[Register.TORQUE] == 1) & ~self._watchdog_ended
-        share = -np.expm1(-time_s / self._lag_s)
-        self.position += np.where(moves, share * (self._table[Register.GOAL] - self.position), 0.0)
+        if self.wiring.is_wheel:
+            moved = self._bus.speed_steps_per_s * time_s * self._table[Register.SPEED]
+        else:
+            moved = -np.expm1(-time_s / self._lag_s) * (self._table[Register.GOAL] - self.position)
+        self.position += np.where(moves, moved, 0.0)
 
-    def _execute(self, instruction: int, parameters: bytes) -> None:
+    def _execute(self, servo: int, instruction: int, parameters: bytes) -> None:
         """Reads or writes one register of several servos, which is all that the loop asks for."""
-        address, size = struct.unpack_from("<HH", parameters)
-        register, rest = Register(address), parameters[4:]
-        if instruction == Instruction.SYNC_READ:
-            for servo in filter(self._servos.__contains__, rest):
-                value = int(self._table[register][servo - 1])
-                if register == Register.POTENTIOMETER:
-                    value = self._counts((servo - 1) // (len(self._servos) // self._n_segments))
-                status = packet(servo, Instruction.STATUS, b"\0" + value.to_bytes(size, "little"))
-                self._answers.append((self._now_s + LATENCY_S, status))
+        start = len(self._bus.place(Register.GOAL))
+        register = next(one for one in self._bus.registers if self._bus.place(one) == parameters[:start])
+        size, rest = self._bus.registers[register][1], parameters[start:]
+        if instruction == SYNC_WRITE:
+            for place in range(0, len(rest), size + 1):
+                if rest[place] in self._servos:
+                    self._write(rest[place] - 1, register, rest[place + 1 : place + 1 + size])
             return
-        for start in range(0, len(rest), size + 1):
-            if rest[start] in self._servos:
-                self._write(rest[start] - 1, register, int.from_bytes(rest[start + 1 : start + 1 + size], "little"))
+        for asked in filter(self._servos.__contains__, rest or [servo]):
+            value = int(self._table[register][asked - 1])
+            if register is Register.SENSED:
+                value = self._counts((asked - 1) // (len(self._servos) // self._n_segments))
+            self._answers.append((self._now_s + self._latency_s, self._bus.answer(asked, register, value)))
 
     def _counts(self, segment: int) -> int:
         """Reads the potentiometer of a segment."""
@@ -128,7 +135,8 @@ class PseudoRobot:
         length_m = REACH_M * of_segment[segment] + self._rng.normal(0.0, self._noise_m)
         return min(max(round(self.wiring.rest_counts + length_m / self.wiring.m_per_count), 0), 4095)
 
-    def _write(self, place: int, register: Register, value: int) -> None:
+    def _write(self, place: int, register: Register, data: bytes) -> None:
+        value = self._bus.value(register, data)
         if register == Register.WATCHDOG and value == 0:
             self._watchdog_ended[place] = False
         elif register == Register.GOAL and self._watchdog_ended[place]:

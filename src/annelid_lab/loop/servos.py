@@ -1,119 +1,36 @@
-"""A robot of position servos on a bus in the manner of Dynamixel's protocol 2.0, a string potentiometer at each.
-
-The protocol and the registers (those of the X540 series) are described at https://emanual.robotis.com/docs/en/dxl/protocol2.
-The maker's `dynamixel-sdk` (4.1.0) is not used. Its sync read gives up all servos when one does not answer, drops the
-error byte by which a servo reports an overload, and polls the port for 34 ms and more before a time-out.
-"""
+"""A robot of servos on a bus, a string potentiometer at each: positions, several turns, or wheels that wind a cable."""
 
 from __future__ import annotations
 
 import math
-import struct
-from collections import Counter
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
-from enum import IntEnum
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from annelid.errors import ConfigError, SimulationStopped
 from annelid.protocols import Array
+from annelid_lab.loop.dynamixel import (
+    MOST_SERVOS,
+    PROTOCOLS,
+    STEPS_PER_TURN,
+    WATCHDOG_UNIT_S,
+    PacketDecoder,
+    Protocol2,
+    Register,
+)
 from annelid_lab.loop.links import Link
 from annelid_lab.loop.remote import PacedPlant
 from annelid_lab.loop.session import ANSWER, STOP_TRIES, STOP_WAIT_S, Limits, Pace, Partner
 
-HEADER = b"\xff\xff\xfd"
-BROADCAST = 254
-MOST_SERVOS = 252
-_MOST_BYTES = 2048
-WATCHDOG_UNIT_S = 0.02
-
-
-class Instruction(IntEnum):
-    """What a packet asks for, or that it is an answer."""
-
-    STATUS = 0x55
-    SYNC_READ = 0x82
-    SYNC_WRITE = 0x83
-
-
-class Register(IntEnum):
-    """Addresses in a servo's table."""
-
-    TORQUE = 64
-    WATCHDOG = 98
-    GOAL = 116
-    POTENTIOMETER = 152
-
-
-def _shifted(crc: int) -> int:
-    for _ in range(8):
-        crc = (crc << 1) ^ (0x18005 if crc & 0x8000 else 0)
-    return crc
-
-
-_CRC_OF_BYTE = [_shifted(byte << 8) for byte in range(256)]
-
-
-def crc16(data: bytes) -> int:
-    """Returns the checksum of a packet: CRC-16 of polynomial 0x8005, from 0, the highest bit first.
-
-    The standard library's `binascii.crc_hqx` has another polynomial, 0x1021.
-    """
-    crc = 0
-    for byte in data:
-        crc = (crc << 8) & 0xFFFF ^ _CRC_OF_BYTE[crc >> 8 ^ byte]
-    return crc
-
-
-def packet(servo: int, instruction: int, parameters: bytes = b"") -> bytes:
-    """Returns a packet for the line."""
-    body = (bytes([instruction]) + parameters).replace(HEADER, HEADER + b"\xfd")
-    head = HEADER + b"\0" + struct.pack("<BH", servo, len(body) + 2)
-    return head + body + struct.pack("<H", crc16(head + body))
-
-
-@dataclass(slots=True)
-class PacketDecoder:
-    """Finds packets in what comes over the bus; holds no more than one.
-
-    Attributes:
-        rejected: How many were not valid, by what was wrong.
-    """
-
-    rejected: Counter[str] = field(default_factory=Counter)
-    _held: bytearray = field(default_factory=bytearray)
-
-    def feed(self, data: bytes) -> Iterator[tuple[int, int, bytes]]:
-        """Yields servo, instruction and parameters of the valid packets that end in these bytes."""
-        self._held += data
-        while (start := self._held.find(HEADER + b"\0")) >= 0:
-            del self._held[:start]
-            if len(self._held) < 7:
-                return
-            length = int.from_bytes(self._held[5:7], "little")
-            if not 3 <= length <= _MOST_BYTES:
-                self._skip("a wrong length")
-                continue
-            if len(self._held) < 7 + length:
-                # What a lost piece swallows ends at the next packet.
-                if (following := self._held.find(HEADER + b"\0", 4)) >= 0:
-                    self.rejected["a part missing"] += 1
-                    del self._held[:following]
-                    continue
-                return
-            whole = bytes(self._held[: 7 + length])
-            if crc16(whole[:-2]) != int.from_bytes(whole[-2:], "little"):
-                self._skip("a wrong checksum")
-                continue
-            del self._held[: len(whole)]
-            body = whole[7:-2].replace(HEADER + b"\xfd", HEADER)
-            yield whole[4], body[0], body[1:]
-        del self._held[:-3]
-
-    def _skip(self, reason: str) -> None:
-        self.rejected[reason] += 1
-        del self._held[:4]
+MOST_TURNS = 256
+MOST_SPEED = 1023
+"""Units of speed of a wheel."""
+UNWOUND = 2.0
+"""Steps from where it is relaxed within which a wheel stops."""
+_LONGEST_UNWINDING_S = 10.0
+_LATENCY_TIMER_S = 0.012
+"""An answer that takes longer waits in a USB adapter, whose latency timer is 16 ms unless it is set."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,25 +40,43 @@ class Wiring:
     Attributes:
         relaxed: Position at activation 0, in the servo's steps.
         contracted: Position at activation 1.
-        rest_counts: What a potentiometer reads at rest.
+        rest_counts: What a potentiometer reads at rest. Servos of protocol 1.0 have none: their own position.
         m_per_count: Length of the segment per count, m.
+        protocol: 1 or 2: how the bus speaks.
+        is_wheel: Whether servos turn without end, at a speed. Positions then are steps of 1/4096 turn, counted by
+            integrating the speeds that were sent, from relaxed at the start; by protocol 1.0 they are what is sensed.
 
     Raises:
-        ConfigError: Equal positions, or a length that is zero.
+        ConfigError: Equal positions, one that the servos do not have, or a length that is zero.
     """
 
     relaxed: int = 1024
     contracted: int = 3072
     rest_counts: float = 512.0
     m_per_count: float = 0.3 / 4095
+    protocol: int = 2
+    is_wheel: bool = False
 
     def __post_init__(self) -> None:
         """Checks the numbers."""
+        if self.protocol not in PROTOCOLS:
+            raise ConfigError(f"protocol must be 1 or 2, not {self.protocol}")
+        turns = self.protocol == 2 or self.is_wheel
+        least, most = (-MOST_TURNS * STEPS_PER_TURN, MOST_TURNS * STEPS_PER_TURN) if turns else (0, STEPS_PER_TURN - 1)
         for name, position in (("relaxed", self.relaxed), ("contracted", self.contracted)):
-            if not 0 <= position <= 4095:
-                raise ConfigError(f"{name} must be a position of 0 .. 4095, not {position}")
+            if not least <= position <= most:
+                raise ConfigError(f"{name} must be a position of {least} .. {most}, not {position}")
         if self.relaxed == self.contracted or self.m_per_count == 0:
             raise ConfigError("relaxed and contracted must differ, and m_per_count must not be 0")
+
+    @property
+    def mode(self) -> int | None:
+        """What is written to `Register.MODE`; None where the servos keep theirs."""
+        bus = PROTOCOLS[self.protocol]
+        if self.is_wheel:
+            return bus.wheel_mode
+        several = not all(0 <= position < STEPS_PER_TURN for position in (self.relaxed, self.contracted))
+        return Protocol2.extended_mode if several else None
 
     def goals(self, activation: Array) -> list[int]:
         """Returns the positions for activations."""
@@ -170,23 +105,28 @@ class ServoPlant(PacedPlant):
         if n_muscles > MOST_SERVOS:
             raise ConfigError(f"a bus has {MOST_SERVOS} servos at most, not {n_muscles}")
         super().__init__(Partner("robot", link, pace, watchdog), pace, limits, rest_m, n_muscles, timestep_s)
-        self._link, self._wiring, self._decoder = link, wiring, PacketDecoder()
+        self._link, self._wiring, self._bus = link, wiring, PROTOCOLS[wiring.protocol]
+        self._decoder = PacketDecoder(self._bus)
         self._ids = range(1, n_muscles + 1)
+        self._wound, self._speed, self._turned_s = np.zeros(n_muscles), np.zeros(n_muscles), pace.clock()
+        self._most_speed = MOST_SPEED
         self._is_open = False
 
     def _begin(self) -> None:
         silence = min(max(math.ceil(self.partner.watchdog * self._pace.period_s / WATCHDOG_UNIT_S), 1), 127)
-        relaxed = self._wiring.goals(np.zeros(self.n_muscles))
         end = self._pace.clock() + 2.0
         missing: set[int] = set(self._ids)
         while missing and self._pace.clock() < end:
             try:
                 # A watchdog that has ended a session takes no goal until it is set to 0.
-                self._write(Register.WATCHDOG, 1, [0] * self.n_muscles)
-                self._write(Register.GOAL, 4, relaxed)
-                self._write(Register.TORQUE, 1, [1] * self.n_muscles)
-                self._write(Register.WATCHDOG, 1, [silence] * self.n_muscles)
-                missing = set(self._ids) - self._read(Register.POTENTIOMETER, 0.2).keys()
+                self._set(Register.WATCHDOG, 0)
+                if self._wiring.mode is not None and not self._is_open:
+                    self._set(Register.TORQUE, 0)
+                    self._set(Register.MODE, self._wiring.mode)
+                self._go(np.zeros(self.n_muscles))
+                self._set(Register.TORQUE, 1)
+                self._set(Register.WATCHDOG, silence)
+                missing = set(self._ids) - self._read(Register.SENSED, 0.2).keys()
             except OSError as error:
                 raise ConfigError(f"the line to the robot at {self._link.name} is gone: {error}") from None
         if missing:
@@ -195,7 +135,31 @@ class ServoPlant(PacedPlant):
                 f"servos {names} do not answer at {self._link.name}: {self.partner.what_came()}; the worm has "
                 f"{self.n_muscles} muscles, so servos 1 .. {self.n_muscles} must be there"
             )
-        self._is_open = True
+        if not self._is_open:
+            self._is_open = True
+            if self._wiring.is_wheel and Register.MOST_SPEED in self._bus.registers:
+                self._most_speed = min(self._read(Register.MOST_SPEED, 0.2).values(), default=0)
+            self._check_latency()
+
+    def _check_latency(self) -> None:
+        """Refuses a line whose answers take longer than they may, and says why one over USB does."""
+        times_s = []
+        for _ in range(3):
+            began = self._pace.clock()
+            self._read(Register.SENSED, 0.2)
+            times_s.append(self._pace.clock() - began)
+        if (time_s := min(times_s)) <= ANSWER * self._pace.period_s:
+            return
+        usb = (
+            "if it is a USB adapter, set its latency timer to 1 ms (Linux: echo 1 > "
+            "/sys/bus/usb-serial/devices/ttyUSB0/latency_timer; Windows: advanced settings of the port), or "
+        )
+        self.stop()
+        raise ConfigError(
+            f"servos at {self._link.name} take {1e3 * time_s:.0f} ms to answer, longer than half a period of "
+            f"{1e3 * self._pace.period_s:g} ms: {usb if time_s > _LATENCY_TIMER_S else ''}lower the rate to "
+            f"{ANSWER / time_s:.0f} Hz"
+        )
 
     def _transfer(self, command: Array) -> dict[str, Array] | None:
         if not self._is_open:
@@ -208,15 +172,18 @@ class ServoPlant(PacedPlant):
                     self.partner.wrong("an answer that is late or twice")
                 if self._pace.clock() > began + ANSWER * self._pace.period_s:
                     break
-            self._write(Register.GOAL, 4, self._wiring.goals(command))
-            counts = self._read(Register.POTENTIOMETER, ANSWER * self._pace.period_s)
+            self._go(command)
+            counts = self._read(Register.SENSED, ANSWER * self._pace.period_s)
         except OSError as error:
             raise self.partner.line_lost(error) from None
         is_whole = len(counts) == self.n_muscles
         self.partner.answered(self._pace.clock() - began if is_whole else None)
         if not is_whole:
             return None
-        read = np.array([counts[servo] for servo in self._ids], dtype=np.float64) - self._wiring.rest_counts
+        read = np.array([counts[servo] for servo in self._ids], dtype=np.float64)
+        if self._wiring.is_wheel and self._wiring.protocol == 1:
+            read = self._wiring.relaxed + self._wound
+        read -= self._wiring.rest_counts
         return {"lengthening_m": self._wiring.m_per_count * read.reshape(self.n_segments, -1).mean(axis=1)}
 
     def _relax(self) -> str | None:
@@ -227,35 +194,59 @@ class ServoPlant(PacedPlant):
         for _ in range(STOP_TRIES):
             try:
                 # Without its watchdog, which would hold a servo on its way to where it is relaxed.
-                self._write(Register.WATCHDOG, 1, [0] * self.n_muscles)
-                self._write(Register.GOAL, 4, self._wiring.goals(self.command))
-                if len(self._read(Register.GOAL, STOP_WAIT_S, 4)) == self.n_muscles:
+                self._set(Register.WATCHDOG, 0)
+                end = self._pace.clock() + _LONGEST_UNWINDING_S
+                self._go(self.command)
+                while self._wiring.is_wheel and np.abs(self._wound).max() > UNWOUND and self._pace.clock() < end:
+                    self._pace.sleep(self._pace.period_s)
+                    self._go(self.command)
+                register = Register.SPEED if self._wiring.is_wheel else Register.GOAL
+                if self._wiring.is_wheel:
+                    self._set(register, 0)
+                if len(self._read(register, STOP_WAIT_S)) == self.n_muscles:
                     return None
             except (OSError, SimulationStopped) as reason:
                 error = f": {reason}"
         return f"the robot at {self._link.name} did not confirm that it stopped{error}"
 
-    def _write(self, register: Register, size: int, values: list[int]) -> None:
-        written = zip(self._ids, values, strict=True)
-        data = b"".join(bytes([servo]) + value.to_bytes(size, "little", signed=size > 1) for servo, value in written)
-        self._link.send(packet(BROADCAST, Instruction.SYNC_WRITE, struct.pack("<HH", register, size) + data))
+    def _go(self, command: Array) -> None:
+        """Sends positions, or the speeds at which wheels get there within a period."""
+        goals = self._wiring.goals(command)
+        if not self._wiring.is_wheel:
+            self._write(Register.GOAL, goals)
+            return
+        now, unit = self._pace.clock(), self._bus.speed_steps_per_s
+        self._wound += unit * self._speed * (now - self._turned_s)
+        left = np.array(goals) - self._wiring.relaxed - self._wound
+        most, wanted = float(self._most_speed), np.rint(left / (unit * self._pace.period_s))
+        self._speed = np.clip(wanted, -most, most)
+        self._write(Register.SPEED, self._speed.astype(int).tolist())
+        self._turned_s = now
 
-    def _read(self, register: Register, wait_s: float, size: int = 2) -> Mapping[int, int]:
+    def _set(self, register: Register, value: int) -> None:
+        self._write(register, [value] * self.n_muscles)
+
+    def _write(self, register: Register, values: Sequence[int]) -> None:
+        if register in self._bus.registers:
+            self._link.send(self._bus.sync_write(register, dict(zip(self._ids, values, strict=True))))
+
+    def _read(self, register: Register, wait_s: float) -> Mapping[int, int]:
         """Reads a number of every servo; those that do not answer in time are left out."""
-        asked = struct.pack("<HH", register, size) + bytes(self._ids)
         until = self._pace.clock() + wait_s
-        self._link.send(packet(BROADCAST, Instruction.SYNC_READ, asked))
         found: dict[int, int] = {}
-        while len(found) < self.n_muscles and (left := until - self._pace.clock()) > 0:
-            for servo, instruction, parameters in self._decoder.feed(self._link.receive(left)):
-                if instruction != Instruction.STATUS or servo not in self._ids or len(parameters) != 1 + size:
-                    self.partner.wrong("a packet that is no answer")
-                elif parameters[0]:
-                    raise SimulationStopped(
-                        f"servo {servo} at {self._link.name} reports error {parameters[0]:#04x} (bit 7: overload, "
-                        "overheating or wrong voltage)"
-                    )
-                else:
-                    found[servo] = int.from_bytes(parameters[1:], "little")
-            self.partner.rejected(self._decoder.rejected, "packet")
+        for question, asked in self._bus.questions(register, self._ids):
+            self._link.send(question)
+            while not found.keys() >= set(asked) and (left := until - self._pace.clock()) > 0:
+                for servo, instruction, parameters in self._decoder.feed(self._link.receive(left)):
+                    status = self._bus.status(instruction, parameters)
+                    if status is None or servo not in asked or len(status[1]) != self._bus.registers[register][1]:
+                        self.partner.wrong("a packet that is no answer")
+                    elif status[0]:
+                        raise SimulationStopped(
+                            f"servo {servo} at {self._link.name} reports error {status[0]:#04x} (overload, "
+                            "overheating, wrong voltage, or a number that it does not take)"
+                        )
+                    else:
+                        found[servo] = int.from_bytes(status[1], "little")
+                self.partner.rejected(self._decoder.rejected, "packet")
         return found

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+import xml.etree.ElementTree as ET
+from collections.abc import Mapping
 from importlib import import_module
 from itertools import count
 from pathlib import Path
@@ -9,9 +12,10 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
-from annelid.arena import ROBOT, names_in, read_mjcf, stated_in, validator
+from annelid.arena import ROBOT, names_in, read_mjcf, stated_in, validator, with_attributes
 from annelid.config import BodyKind, Line, OwnModel
-from annelid.errors import listed, shown
+from annelid.errors import ConfigError, listed, shown
+from annelid.textfiles import toml_value
 from annelid_lab.robots.cables import write_out
 
 if TYPE_CHECKING:
@@ -31,6 +35,8 @@ EXAMPLE = """<mujoco><compiler autolimits="true"/><worldbody><geom name="floor" 
 </sensor></mujoco>"""
 """Four balls on a floor and three motors that draw each to the one before it."""
 PLACE = "{segment}"
+_JOINTS = "worldbody//joint"
+_DRIVEN = ("joint", "jointinparent", "tendon", "site", "cranksite")
 
 
 def _pattern(text: str) -> str:
@@ -40,6 +46,18 @@ def _pattern(text: str) -> str:
 
 
 Pattern = Annotated[Line, Field(max_length=100), AfterValidator(_pattern)]
+
+
+def _completed(root: ET.Element) -> None:
+    """Writes out cables, and names an actuator without a name by the joint, tendon or site that it drives."""
+    write_out(root)
+    actuators = root.findall("actuator/*")
+    taken = {one.get("name") for one in actuators}
+    for one in actuators:
+        driven = next((one.attrib[key] for key in _DRIVEN if key in one.attrib), None)
+        if "name" not in one.attrib and driven is not None and driven not in taken:
+            one.set("name", driven)
+            taken.add(driven)
 
 
 class MjcfBody(BodyKind):
@@ -60,10 +78,15 @@ class MjcfBody(BodyKind):
     )
     sensors: Annotated[tuple[Pattern, ...], Field(min_length=1, max_length=200)] = Field(
         default=("stretch_{segment}",),
-        description="names of a segment's stretch sensors: tendons, or sensors of a tendon's or a joint's length",
+        description="names of a segment's stretch sensors: tendons, joints, or sensors of their lengths",
     )
     first_segment: Annotated[int, Field(ge=0, le=1)] = Field(
         default=1, description="number of the foremost segment in the names"
+    )
+
+    attributes: Mapping[Line, Mapping[Line, Mapping[Line, float | Line]]] = Field(
+        default={},
+        description="other values of the file's attributes, by tag, name and attribute, as joint.tail.damping = 2",
     )
 
     @classmethod
@@ -73,7 +96,7 @@ class MjcfBody(BodyKind):
         Raises:
             ConfigError: The file cannot be read, or has what a robot cannot have.
         """
-        xml = read_mjcf(path, ROBOT, write_out)
+        xml = read_mjcf(path, ROBOT, _completed)
         step_s = stated_in(xml, ROBOT, "option", "timestep")
         clock = {} if step_s is None else {"clock": {"physics_timestep_s": step_s}}
         return {"body": {"kind": "mjcf", "xml": xml}, **clock}
@@ -81,7 +104,7 @@ class MjcfBody(BodyKind):
     @property
     def n_segments(self) -> int:
         """Segments that have all their actuators, counted from the first one on."""
-        there = set(names_in(self.xml, ROBOT, "actuator"))
+        there = set(names_in(self.xml, ROBOT, "actuator/*"))
         return next(n for n in count() if not there.issuperset(self._named(self.actuators, n)))
 
     @property
@@ -91,9 +114,9 @@ class MjcfBody(BodyKind):
 
     @property
     def own_model(self) -> OwnModel:
-        """The file, and the names of the actuators of all segments."""
+        """The file with the attributes of this section, and the names of the actuators of all segments."""
         names = (name for n in range(self.n_segments) for name in self._named(self.actuators, n))
-        return OwnModel(self.xml, tuple(names))
+        return OwnModel(with_attributes(self.xml, ROBOT, self.attributes), tuple(names))
 
     @property
     def sensor_names(self) -> list[list[str]]:
@@ -104,21 +127,42 @@ class MjcfBody(BodyKind):
     def _has_segments(self) -> Self:
         if not self.n_segments:
             wanted = listed(self._named(self.actuators, 0))
-            there = listed(names_in(self.xml, ROBOT, "actuator")) or "none"
-            raise ValueError(f"body.actuators: the file has no actuator named {wanted}; it has {there}")
-        known = {*names_in(self.xml, ROBOT, "tendon"), *names_in(self.xml, ROBOT, "sensor")}
+            there = names_in(self.xml, ROBOT, "actuator/*")
+            pattern = re.sub(r"\d+", PLACE, there[0], count=1) if there else ""
+            remedy = (
+                f"write actuators = [{toml_value(pattern)}] under [body]"
+                if PLACE in pattern
+                else (
+                    "name them by numbers"
+                    if there
+                    else "without any it can be an arena (annelid run PRESET --arena FILE)"
+                )
+            )
+            raise ValueError(
+                f"body.actuators: the file has no actuator named {wanted}; it has {listed(there) or 'none'}: {remedy}"
+            )
+        known = {name for path in ("tendon/*", "sensor/*", _JOINTS) for name in names_in(self.xml, ROBOT, path)}
         for name in (name for names in self.sensor_names for name in names):
             if name not in known:
                 raise ValueError(
-                    f"body.sensors: the file has no tendon and no sensor named {name!r}; it has "
+                    f"body.sensors: the file has no tendon, joint or sensor named {name!r}; it has "
                     f"{listed(sorted(known)) or 'none'}"
                 )
+        try:
+            _ = self.own_model
+        except ConfigError as error:
+            raise ValueError(f"body.attributes: the file {error}") from None
         return self
 
     def check_with(self, config: RunConfig) -> None:
-        """Checks that no arena is given."""
-        if config.arena is not None:
-            raise ValueError("arena has no effect on body.kind = 'mjcf', whose file has its own ground")
+        """Checks that the arena, if there is one, is a scene at rest."""
+        arena = config.arena
+        if arena is not None and (not arena.is_scene or arena.object_names):
+            kind = "things that move" if arena.is_scene else f"arena.kind = {arena.kind!r}"
+            raise ValueError(
+                f"{kind} cannot be beside body.kind = 'mjcf', whose file has its own ground: --arena takes a scene as "
+                "MJCF without joints"
+            )
 
     def build(self, config: RunConfig) -> Plant:
         """Builds the robot, as `BodyKind.build`."""

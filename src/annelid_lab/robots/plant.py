@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
 from typing import Any
 
 import mujoco
 import numpy as np
 
+from annelid.body import compile_robot
 from annelid.clock import StepRatio
 from annelid.config import RunConfig
-from annelid.errors import ConfigError, SimulationStopped, shortened
+from annelid.errors import ConfigError, SimulationStopped
 from annelid.protocols import Array, Recordable, SavedAndRecorded, Sensation, Signal, State, Values
 from annelid.simulation import ENGINE_WARNINGS, STATE_PARTS
 from annelid_lab.robots.body import MjcfBody
@@ -21,22 +23,6 @@ _TENDON, _SITE = int(mujoco.mjtTrn.mjTRN_TENDON), int(mujoco.mjtTrn.mjTRN_SITE)
 _JOINTS = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
 _WRAPPED = (("xanchor", int(mujoco.mjtWrap.mjWRAP_JOINT)), ("site_xpos", int(mujoco.mjtWrap.mjWRAP_SITE)))
 """The engine's arrays of the places that tendons go through, and its numbers for them."""
-
-
-def compile_robot(xml: str, physics_timestep_s: float) -> mujoco.MjModel:
-    """Compiles a robot with another step than its file states.
-
-    Raises:
-        ConfigError: The engine refuses the model.
-    """
-    try:
-        model = mujoco.MjModel.from_xml_string(xml)
-    except (ValueError, mujoco.FatalError) as error:
-        reason = " ".join(str(error).split()).removeprefix("Error: ")
-        raise ConfigError(f"the engine refuses the robot: {shortened(reason, 200)}") from None
-    model.opt.timestep = physics_timestep_s
-    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
-    return model
 
 
 class MjcfPlant(SavedAndRecorded):
@@ -61,7 +47,8 @@ class MjcfPlant(SavedAndRecorded):
 
     def __init__(self, body: MjcfBody, config: RunConfig) -> None:
         """Builds the robot in the posture that its file describes."""
-        model = compile_robot(body.xml, config.clock.physics_timestep_s)
+        model = compile_robot(config)
+        model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
         self.model, self.data = model, mujoco.MjData(model)
         self.n_segments, self.n_muscles = body.n_segments, body.n_segments * len(body.actuators)
         self._config = config
@@ -71,6 +58,7 @@ class MjcfPlant(SavedAndRecorded):
         self._sensors = [[self._reading(name) for name in names] for names in body.sensor_names]
         commands = np.array([self._commands(actuator) for actuator in self._actuators.tolist()])
         self._rest, self._contracted = commands[:, 0], commands[:, 1]
+        self._units = self._angles()
         self._places = [place for one in self._actuators.tolist() if (place := self._joints_or_sites(one)) is not None]
         self._gear = model.actuator_gear[self._actuators, 0]
         self._moves = model.body_weldid > 0
@@ -168,8 +156,9 @@ class MjcfPlant(SavedAndRecorded):
     def recordable(self) -> Recordable:
         """Names the signals, also the posture of every frame."""
         known = super().recordable()
+        signals = [replace(one, units=self._units.get(one.name, one.units)) for one in known.signals]
         posture = Signal("qpos", ("coordinate",), (self.model.nq,), "1", "generalised position", True)
-        return Recordable((*known.signals, posture), known.coords, known.attrs)
+        return Recordable((*signals, posture), known.coords, known.attrs)
 
     def read(self, frame: bool) -> Values:
         """Reads the present values of the posture, or of all others."""
@@ -215,14 +204,35 @@ class MjcfPlant(SavedAndRecorded):
         return float(self.data.energy[1])
 
     def _reading(self, name: str) -> tuple[str, int]:
-        """Returns the engine's array and the place in it of a stretch sensor: of a tendon, or a sensor."""
-        tendon = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_TENDON, name)
-        if tendon >= 0:
+        """Returns the engine's array and the place in it of a stretch sensor: a tendon, a sensor or a joint."""
+        model = self.model
+        if (tendon := mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TENDON, name)) >= 0:
             return "ten_length", tendon
-        return "sensordata", int(self.model.sensor(name).adr[0])
+        if (sensor := mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SENSOR, name)) >= 0:
+            return "sensordata", int(model.sensor_adr[sensor])
+        return "qpos", int(model.jnt_qposadr[model.joint(name).id])
 
     def _stretch(self) -> Array:
         return np.array([[float(getattr(self.data, where)[place]) for where, place in row] for row in self._sensors])
+
+    def _angles(self) -> dict[str, str]:
+        """Returns the units of signals that hinges give, and says that tables take these for lengths."""
+        model, hinge = self.model, int(mujoco.mjtJoint.mjJNT_HINGE)
+        hinges = {("qpos", place) for place in model.jnt_qposadr[model.jnt_type == hinge].tolist()}
+        is_of_joint = model.sensor_objtype == mujoco.mjtObj.mjOBJ_JOINT
+        sensed = is_of_joint & (model.jnt_type[np.where(is_of_joint, model.sensor_objid, 0)] == hinge)
+        hinges |= {("sensordata", place) for place in model.sensor_adr[sensed].tolist()}
+        sensors = [sensor in hinges for row in self._sensors for sensor in row]
+        driven = model.actuator_trnid[self._actuators, 0]
+        is_joint = np.isin(model.actuator_trntype[self._actuators], _JOINTS)
+        rings = is_joint & (model.jnt_type[np.where(is_joint, driven, 0)] == hinge)
+        if any(sensors) or rings.any():
+            warnings.warn(
+                "sensors or actuators of this robot are angles: where a table says cm, read 0.01 rad, and N m for N",
+                stacklevel=2,
+            )
+        units = {"stretch_length": "rad"} if all(sensors) else {}
+        return units | ({"ring_length": "rad", "muscle_force": "N m"} if rings.all() else {})
 
     def _commands(self, actuator: int) -> tuple[float, float]:
         """Returns the commands of an actuator at rest and contracted."""

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from annelid.clock import SLACK_S
 from annelid.config import ControllerKind, NonNegative, Positive
-from annelid.control import OpenLoopController, SegmentController, lengthening_m
+from annelid.control import OpenLoopKind, SegmentController, lengthening_m
 from annelid.errors import ConfigError
 from annelid.protocols import SIDES, Array, Plant, Sensation, Values
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 BELLY = SIDES.index("belly")
 
 
-class DiscreteGait(ControllerKind):
+class DiscreteGait(OpenLoopKind):
     """Open loop: a pattern of contracted and relaxed segments that moves back by whole segments.
 
     In each unit of time the same number of segments in a row is contracted, thin and long, while the others anchor the
@@ -29,6 +29,7 @@ class DiscreteGait(ControllerKind):
     worms, with the transitions left to the muscles.
     """
 
+    title = "discrete gait"
     cites = (("fang2015", "the family of discrete gaits"),)
     kind: Literal["discrete"] = "discrete"
     contracted: int = Field(default=1, ge=1, le=199, description="segments in a row that are contracted at a time")
@@ -43,34 +44,11 @@ class DiscreteGait(ControllerKind):
                     f"controller.{name} = {value}: must be less than the number of segments, {config.body.n_segments}"
                 )
 
-    def build(self, config: RunConfig, plant: Plant) -> DiscreteController:
-        """Builds the controller, as `ControllerKind.build`."""
-        return DiscreteController(self, plant.n_segments, plant.n_muscles)
-
-
-class DiscreteController(OpenLoopController[DiscreteGait]):
-    """A discrete gait on the muscles.
-
-    Raises:
-        ConfigError: Muscles that are neither one nor two per segment.
-    """
-
-    name = "discrete gait"
-
-    def activation(self, time_s: ArrayLike) -> Array:
-        """Returns the activation at times.
-
-        Args:
-            time_s: Simulated times, s, any shape.
-
-        Returns:
-            1 for the segments i = 0 .. N-1 with ``(i - shift unit) mod N < contracted``, else 0, shape
-            ``(*time_s.shape, n_segments)``.
-        """
-        gait = self.pattern
-        unit = np.floor((np.asarray(time_s, dtype=float)[..., np.newaxis] + SLACK_S) / gait.unit_s)
-        place = (np.arange(self.n_segments) - gait.shift * unit) % self.n_segments
-        return (place < gait.contracted).astype(float)
+    def activation(self, time_s: ArrayLike, n_segments: int) -> Array:
+        """Returns 1 for the segments i = 0 .. N-1 with ``(i - shift unit) mod N < contracted``, else 0."""
+        unit = np.floor((np.asarray(time_s, dtype=float)[..., np.newaxis] + SLACK_S) / self.unit_s)
+        place = (np.arange(n_segments) - self.shift * unit) % n_segments
+        return (place < self.contracted).astype(float)
 
 
 class ReflexWave(ControllerKind):

@@ -12,7 +12,6 @@ import numpy as np
 from pydantic import FiniteFloat, TypeAdapter, ValidationError
 
 from annelid.analysis import lengthening_score, passage_of
-from annelid.body import motor_power_W
 from annelid.errors import RunFileError
 from annelid.experiment import Store, case_key, numerical_problem
 from annelid.simulation import Run
@@ -121,7 +120,8 @@ def progress(run: Run, task: Task) -> tuple[np.ndarray, np.ndarray]:
 def electric_energy_J(time_s: np.ndarray, force_N: np.ndarray, length_m: np.ndarray) -> float:
     """Energy that direct-current motors would take to pull as the muscles did.
 
-    Their power is that of `annelid.body.motor_power_W`, with `STALL_FORCE_N` and `FREE_SPEED_M_PER_S`.
+    Their power is ``max(0, F v + F^2 v0 / F0)``, mechanical power and the heat of the current, with the force F0 at
+    which a motor stands still and its speed v0 without load.
 
     Args:
         time_s: Times of the samples, s, ``(n,)``.
@@ -130,4 +130,5 @@ def electric_energy_J(time_s: np.ndarray, force_N: np.ndarray, length_m: np.ndar
     """
     step = np.diff(time_s)[:, np.newaxis]
     force, shortening = force_N[1:], -np.diff(length_m, axis=0) / step
-    return float((motor_power_W(force, shortening, STALL_FORCE_N, FREE_SPEED_M_PER_S) * step).sum())
+    power_W = force * shortening + force**2 * FREE_SPEED_M_PER_S / STALL_FORCE_N
+    return float((power_W.clip(0.0) * step).sum())

@@ -23,7 +23,6 @@ from annelid.cli import (
     Output,
     Quiet,
     ResultsFolder,
-    SchedulerAddress,
     config_of,
     kept_runs,
     lock,
@@ -59,15 +58,12 @@ class Study:
             "output": (Output, Path(self.output or self.name)),
             "quick": (Annotated[bool, typer.Option("--quick", help=words["quick"])], False),
             "jobs": (Jobs, None),
-            "scheduler": (SchedulerAddress, None),
             "quiet": (Quiet, False),
         }
 
-        def run(
-            output: Path, quick: bool, jobs: int | None, scheduler: str | None, quiet: bool, **further: Any
-        ) -> None:
+        def run(output: Path, quick: bool, jobs: int | None, quiet: bool, **further: Any) -> None:
             compute = getattr(import_module(f"annelid_studies.{self.module}"), self.function)
-            with kept_runs(output, jobs=jobs, scheduler=scheduler, quiet=quiet) as store:
+            with kept_runs(output, jobs=jobs, quiet=quiet) as store:
                 written, tables = compute(store, output, "quick" if quick else "full", **further)
             print_results(written, *tables, quiet=quiet)
 
@@ -108,8 +104,18 @@ def load_frame_command(
     output: ResultsFolder = Path("load-frame"),
     assignments: Assignments = None,
     fidelity: FidelityLevel = None,
-    displacement: Annotated[float, typer.Option(help="How far the cable is wound, mm.")] = 330.0,
-    speed: Annotated[float, typer.Option(help="Speed of the cable, mm/s.")] = 10.0,
+    displacement: Annotated[
+        float | None,
+        typer.Option(help="How far the cable is wound, mm.  [default: 330 for a radius of 0.16 m, in proportion]"),
+    ] = None,
+    diameter_share: Annotated[
+        float | None,
+        typer.Option(help="The same as a share of the diameter, below 0.8: 0.5 halves it."),
+    ] = None,
+    speed: Annotated[
+        float | None,
+        typer.Option(help="Speed of the cable, mm/s.  [default: 10 for a radius of 0.16 m, in proportion]"),
+    ] = None,
     cable_friction: Annotated[
         float,
         typer.Option(
@@ -119,19 +125,23 @@ def load_frame_command(
         ),
     ] = 0.0,
     data: Annotated[
-        Path | None, typer.Option(help="Measured loop to compare with: CSV of mm, N  [default: the authors' loop]")
+        Path | None,
+        typer.Option(
+            help="Measured loop to compare with: CSV of mm, N  [default: the authors' loop, for a worm of its size]"
+        ),
     ] = None,
     quiet: Quiet = False,
     force: Force = False,
 ) -> None:
     """Close one ring by its cable and open it again.
 
-    The cable winds in the middle ring of a weightless worm slowly, and lets it out again. The table compares its force
-    with the authors' measurement on one segment of their robot. It takes a few seconds. Writes load_frame.csv, .png and
-    .svg.
+    The cable winds in the middle ring of a weightless worm slowly, and lets it out again. For a worm of the robot's
+    size, the table compares its force with the authors' measurement on one segment. It takes a few seconds. Writes
+    load_frame.csv, .png and .svg.
 
     \b
     annelid study load-frame
+    annelid study load-frame mine.toml --diameter-share 0.5
     annelid study load-frame --set body.strands.young_modulus_Pa=1e9
     annelid study load-frame --set body.joints.dry_friction_Nm=0.01
     """
@@ -141,16 +151,26 @@ def load_frame_command(
     table = output / "load_frame.csv"
     lock(output)
     refuse_existing(table, force)
-    measured = frame.read_loop(data)
     config = config_of(preset, overrides_of(assignments), fidelity=fidelity)
+    if displacement is not None and diameter_share is not None:
+        raise typer.BadParameter("--displacement and --diameter-share say the same: give one of them")
+    # A loop of a far larger or smaller ring says nothing of this one.
+    has_measured = data is not None or abs(frame.size_of(config) - 1.0) <= 0.2
+    measured = {"measured": frame.read_loop(data)} if has_measured else {}
     with study_progress(quiet=quiet) as progress:
         report = None if progress is None else partial(progress, "load frame", 0, 0)
-        sizes = {"displacement_m": displacement * 1e-3, "speed_m_per_s": speed * 1e-3}
-        tension = frame.load_frame(config, **sizes, progress=report)
+        tension = frame.load_frame(
+            config,
+            displacement_m=None if displacement is None else displacement * 1e-3,
+            diameter_share=diameter_share,
+            speed_m_per_s=None if speed is None else speed * 1e-3,
+            progress=report,
+        )
     loop = frame.cable_force(tension, cable_friction)
-    loops = {config.name: loop, "measured": measured}
-    written = frame.write_loop(loop, tension, table), frame.draw_loops(loops, table.with_suffix(""))
+    loops = {config.name: loop, **measured}
+    ratio = frame.cable_per_diameter(config)
+    written = frame.write_loop(loop, tension, table), frame.draw_loops(loops, table.with_suffix(""), ratio)
     found = {
         name: {"peak_N": loop.force_N.max().item(), "lost_share": loop.lost_share()} for name, loop in loops.items()
     }
-    print_results(written, frame.frame_table(loops), quiet=quiet, results={"loops": found})
+    print_results(written, frame.frame_table(loops, ratio), quiet=quiet, results={"loops": found})

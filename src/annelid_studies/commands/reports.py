@@ -15,7 +15,6 @@ from annelid.cli import (
     Output,
     Quiet,
     ResultsFolder,
-    SchedulerAddress,
     command,
     end_study,
     going_on,
@@ -40,7 +39,6 @@ def paper_command(
         typer.Option(metavar="NAME", help="Only the main numbers and this examination; may be repeated."),
     ] = None,
     jobs: Jobs = None,
-    scheduler: SchedulerAddress = None,
     claims: Annotated[
         Path | None, typer.Option(metavar="FILE.md", help="Also write the table of claims as Markdown.")
     ] = None,
@@ -69,7 +67,7 @@ def paper_command(
         claims = with_suffix(claims, (".md",), "Markdown", default=".md")
         if not claims.parent.is_dir():
             raise RunFileError(f"{claims} cannot be written: there is no folder {claims.parent}")
-    with kept_runs(output, jobs=jobs, scheduler=scheduler, quiet=quiet) as store:
+    with kept_runs(output, jobs=jobs, quiet=quiet) as store:
         effort = "quick" if quick else "full"
         report = reproduce(output, effort, only=only or None, executor=store.executor, progress=store.progress)
         html = write_report(report, output)
@@ -142,7 +140,6 @@ def robustness_command(
         list[str] | None, typer.Option(metavar="KIND", help="Only this one; may be repeated.  [default: all four]")
     ] = None,
     jobs: Jobs = None,
-    scheduler: SchedulerAddress = None,
     quiet: OnlyPaths = False,
 ) -> None:
     """Compare how often controllers make different worms walk.
@@ -163,7 +160,7 @@ def robustness_command(
     """
     from annelid_studies.robustness import CONTROLLERS, robustness, shares, shares_table
 
-    with kept_runs(output, jobs=jobs, scheduler=scheduler, quiet=quiet) as store:
+    with kept_runs(output, jobs=jobs, quiet=quiet) as store:
         judged = robustness(
             output,
             points,
@@ -211,7 +208,6 @@ def challenge_command(
     ] = None,
     output: Output = Path("challenge"),
     jobs: Jobs = None,
-    scheduler: SchedulerAddress = None,
     quiet: Quiet = False,
 ) -> None:
     """Rank controllers in a benchmark of crawling.
@@ -245,7 +241,7 @@ def challenge_command(
     if tune is not None:
         if entrants:
             found = {name: one for name, one in found.items() if name != tasks.REFERENCE or name in entrants}
-        with kept_runs(output, jobs=jobs, scheduler=scheduler, quiet=quiet) as store:
+        with kept_runs(output, jobs=jobs, quiet=quiet) as store:
             best = tuned(found, tune, store, bodies=body or [], tasks=task or [], duration_s=duration_s)
         print_results([write_entrants(best, output / "entrants.toml")], quiet=quiet)
         return
@@ -255,7 +251,7 @@ def challenge_command(
     if half_step:
         some = seeds[: -(-draws // tasks.HALF_OF)]
         wanted += tasks.entries(found, task or [], some, bodies=body or [], finer=2, duration_s=duration_s)
-    with kept_runs(output, jobs=jobs, scheduler=scheduler, quiet=quiet) as store:
+    with kept_runs(output, jobs=jobs, quiet=quiet) as store:
         scores = challenge(store, wanted, earlier)
     ranked, compared, changes = standings(scores), pairs(scores), half_step_changes(scores)
     written = [

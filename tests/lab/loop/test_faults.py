@@ -235,8 +235,8 @@ def test_an_error_of_the_robot_and_one_of_the_controller(tmp_path: Path) -> None
     check(line, body, tmp_path / "one", ended)
     other = Line(robot(body := Body()), FakeClock())
     ended = loop(other, tmp_path / "two", lambda s: np.full(3, 0.5 if s.time_s < 0.1 else np.nan))
-    assert "the controller function returned activation nan for muscle 1" in ended
-    assert open_run(tmp_path / "two").status == "failed"
+    assert "the controller gave muscle 1 an activation of nan" in ended
+    assert open_run(tmp_path / "two").status == "stopped_by_guard"
     other.receive(0.2)
     assert body.commands[-1].max() == 0.0
 

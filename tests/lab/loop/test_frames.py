@@ -20,6 +20,7 @@ from annelid.control import SENSED
 from annelid.errors import ConfigError
 from annelid_lab.firmware import Firmware, controller_firmware
 from annelid_lab.firmware.host import OPTIONS
+from annelid_lab.loop.dynamixel import PROTOCOLS, PacketDecoder, crc16
 from annelid_lab.loop.frames import (
     MOST_BYTES,
     Decoder,
@@ -36,7 +37,6 @@ from annelid_lab.loop.frames import (
     unstuffed,
 )
 from annelid_lab.loop.peer import Fault, Peer
-from annelid_lab.loop.servos import PacketDecoder, crc16, packet
 
 COMPILER = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler called cc")
 FRAMES = st.builds(
@@ -114,17 +114,21 @@ def test_the_interface_distinguishes_what_has_as_many_numbers() -> None:
 
 def test_servo_packets_are_those_of_the_manual() -> None:
     # The examples of https://emanual.robotis.com/docs/en/dxl/protocol2: ping of servo 1, and a read of its position.
+    packet = PROTOCOLS[2].packet
     assert packet(1, 0x01) == bytes.fromhex("fffffd00010300 01 194e".replace(" ", ""))
     assert packet(1, 0x02, b"\x84\x00\x04\x00") == bytes.fromhex("fffffd0001070002840004001d15")
     assert crc16(b"") == 0
+    # The examples of protocol1: reading the temperature of servo 1, and its answer.
+    assert PROTOCOLS[1].packet(1, 0x02, b"\x2b\x01") == bytes.fromhex("ffff0104022b01cc")
+    assert list(PacketDecoder(PROTOCOLS[1]).feed(bytes.fromhex("ffff01030020db"))) == [(1, 0, b"\x20")]
 
 
-@given(st.integers(0, 253), st.binary(max_size=100), st.binary(max_size=20))
-def test_servo_packets_come_back_with_marks_inside(servo: int, data: bytes, noise: bytes) -> None:
+@given(st.sampled_from([1, 2]), st.integers(0, 253), st.binary(max_size=100), st.binary(max_size=20))
+def test_servo_packets_come_back_with_marks_inside(protocol: int, servo: int, data: bytes, noise: bytes) -> None:
     data = data + b"\xff\xff\xfd" + data
-    line = packet(servo, 0x55, data)
-    assert line.count(b"\xff\xff\xfd\0") == 1
-    decoder = PacketDecoder()
+    line = PROTOCOLS[protocol].packet(servo, 0x55, data)
+    assert protocol == 1 or line.count(b"\xff\xff\xfd\0") == 1
+    decoder = PacketDecoder(PROTOCOLS[protocol])
     assert list(decoder.feed(noise.replace(b"\xff", b"") + line + line)) == [(servo, 0x55, data)] * 2
 
 

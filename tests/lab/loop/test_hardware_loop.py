@@ -9,6 +9,7 @@ import threading
 import tty
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -27,9 +28,10 @@ from annelid.protocols import Sensation
 from annelid.simulation.runfile import open_run
 from annelid_lab.firmware import controller_firmware
 from annelid_lab.loop import Interface, Limits, Peer, PseudoRobot, Role, UdpLink, Wiring, drive, open_link
+from annelid_lab.loop.dynamixel import PROTOCOLS, Register
 from annelid_lab.loop.links import Link
 from annelid_lab.loop.peer import serve
-from annelid_lab.loop.servos import Instruction, ServoPlant, packet
+from annelid_lab.loop.servos import ServoPlant
 from annelid_lab.loop.session import Pace
 
 COMPILER = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler called cc")
@@ -71,10 +73,10 @@ class Bus(PseudoRobot):
 
     name = "bus"
 
-    def __init__(self, **fields: float) -> None:
+    def __init__(self, **fields: Any) -> None:
         self.clock = FakeClock()
         self.fault: Callable[[bytes], bytes] = lambda data: data
-        super().__init__(3, 3, **fields, clock=self.clock, sleep=self.clock.sleep)  # type: ignore[arg-type]
+        super().__init__(3, 3, **fields, clock=self.clock, sleep=self.clock.sleep)
 
     def send(self, data: bytes) -> None:
         self.fault(b"")
@@ -92,7 +94,7 @@ class Bus(PseudoRobot):
 
 def servo_plant(bus: Bus, n_muscles: int = 3, limits: Limits | None = None) -> ServoPlant:
     pace = Pace(0.01, bus.clock, bus.clock.sleep)
-    return ServoPlant(bus, pace, limits or Limits(), np.full(3, 0.3), n_muscles, 0.001, 5, WIRING)
+    return ServoPlant(bus, pace, limits or Limits(), np.full(3, 0.3), n_muscles, 0.001, 5, bus.wiring)
 
 
 def test_a_robot_of_servos_follows_with_its_lag_and_is_read_in_whole_counts() -> None:
@@ -109,6 +111,36 @@ def test_a_robot_of_servos_follows_with_its_lag_and_is_read_in_whole_counts() ->
     assert np.array(sensed)[-1] == pytest.approx([0.06, 0.03, 0.0], abs=3e-4)
     plant.stop()
     assert bus.later(3.0) == pytest.approx(0.0, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    "wiring",
+    [
+        Wiring(relaxed=-9000, contracted=11_000),
+        Wiring(relaxed=0, contracted=9000, is_wheel=True),
+        Wiring(relaxed=0, contracted=-9000, rest_counts=0, m_per_count=-0.06 / 9000, protocol=1, is_wheel=True),
+        Wiring(relaxed=200, contracted=800, protocol=1),
+    ],
+)
+def test_servos_of_several_turns_and_wheels_get_there_and_back(wiring: Wiring) -> None:
+    bus = Bus(noise_m=0.0, lag_s=0.05, wiring=wiring)
+    plant = servo_plant(bus)
+    sensed = plant.reset(0)
+    for _ in range(150):
+        sensed = plant.stride(np.tile([1.0, 0.5, 0.0], (10, 1)))
+    assert bus.contraction == pytest.approx([1.0, 0.5, 0.0], abs=2e-3)
+    assert sensed.stretch_m[:, 0] - 0.3 == pytest.approx([0.06, 0.03, 0.0], abs=3e-4)
+    mode = PROTOCOLS[wiring.protocol].wheel_mode if wiring.is_wheel else 4
+    assert wiring.mode is None or (bus._table[Register.MODE] == mode).all()
+    plant.stop()
+    assert bus.later(3.0) == pytest.approx(0.0, abs=1e-3)
+    assert not plant.doubts()
+
+
+def test_the_latency_timer_of_a_usb_adapter_is_recognised() -> None:
+    bus = Bus(latency_s=0.016)
+    with pytest.raises(ConfigError, match=r"take 16 ms .* half a period of 10 ms: .*latency timer .* rate to 31 Hz"):
+        servo_plant(bus).reset(0)
 
 
 @pytest.mark.parametrize(
@@ -160,7 +192,7 @@ def test_a_servo_that_is_unplugged_or_missing_or_overheated_is_said() -> None:
     bus = Bus()
     plant = servo_plant(bus)
     plant.reset(0)
-    bus.fault = lambda data: packet(2, Instruction.STATUS, b"\x80\0\0") if data else b""
+    bus.fault = lambda data: PROTOCOLS[2].packet(2, 0x55, b"\x80\0\0") if data else b""
     with pytest.raises(SimulationStopped, match="servo 2 at bus reports error 0x80"):
         plant.stride(np.ones((10, 3)))
 

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from annelid.arena.centre_line import AHEAD, UP, Bore, Course, Curve, Straight
-from annelid.arena.kinds.floor import refuse_heading
+from annelid.arena.kinds.floor import Slope
 from annelid.arena.surface import Implicit, Level, Shape, grid_faces, lengths
 from annelid.config.run import ArenaKind, RunConfig
 from annelid.config.sections import NonNegative, Positive
@@ -63,6 +63,7 @@ class Pipe(ArenaKind):
     narrowest_m: Positive = Field(default=0.13, description="radius of the narrowest bore of a taper or an hourglass")
     profile_start_m: NonNegative = Field(default=0.2, description="where the bore begins to narrow")
     profile_length_m: Positive = Field(default=0.5, description="length over which it changes")
+    slope_deg: Slope = 0.0
 
     @model_validator(mode="after")
     def _a_pipe_that_can_be(self) -> Self:
@@ -85,12 +86,17 @@ class Pipe(ArenaKind):
         return self
 
     @property
+    def slope_rad(self) -> float:
+        """As `slope_deg`, in rad."""
+        return radians(self.slope_deg)
+
+    @property
     def floor_depth_m(self) -> float:
         """Of a floor that is there to be seen only."""
         return PIPE_ABOVE_FLOOR_M
 
     def check_with(self, config: RunConfig) -> None:
-        """Checks that the worm leads along the pipe and fits into its entry."""
+        """Checks that the worm fits into its entry."""
         free, mesh = self.bore_m + self.entry_clearance_m, getattr(config.body, "mesh", None)
         if mesh is not None and free < max(mesh.radii_m):
             raise ValueError(
@@ -98,7 +104,6 @@ class Pipe(ArenaKind):
                 f"at least body.mesh.radius_m = {max(mesh.radii_m):g}, the worm that starts inside; make it narrower "
                 "further on with arena.profile"
             )
-        refuse_heading(config, f"arena.kind = {self.kind!r}")
 
     def ground(self) -> PipeWall:
         """Returns the inside of the wall."""

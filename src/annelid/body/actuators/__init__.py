@@ -29,11 +29,6 @@ negative, since the engine drops what would destabilise it. From lengths, m, the
 is multiplied by (the muscles' activation), and tensions, N, ``(n_muscles,)`` each."""
 
 
-MotorPower = Callable[[Array, Array], Array]
-"""Electrical power, W, of one worm's actuators from their tensions, N, and speeds of shortening, m/s, ``(n_muscles,)``
-each."""
-
-
 class ActuatorKind(Kind):
     """Base of the ring actuators' sections: how they lie, between which lengths they work, and what is asked of them.
 
@@ -105,10 +100,6 @@ class ActuatorKind(Kind):
     @abstractmethod
     def slopes(self, model: mujoco.MjModel) -> Slopes:
         """Returns how steeply the tensions of a compiled body rise, as the engine linearises them."""
-
-    def motor_power(self, model: mujoco.MjModel) -> MotorPower | None:
-        """Returns the electrical power of a compiled body's motors; None where it has none that are known."""
-        return None
 
     @property
     def muscle(self) -> ActuatorKind | None:

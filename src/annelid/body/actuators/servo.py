@@ -7,10 +7,9 @@ from math import expm1
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
 from pydantic import Field
 
-from annelid.body.actuators import ActuatorKind, MotorPower, PerSegment, Slopes
+from annelid.body.actuators import ActuatorKind, PerSegment, Slopes
 from annelid.body.estimates import (
     ESTIMATE_FACTOR,
     MOST_SHRUNK_AT_REST,
@@ -38,9 +37,8 @@ class ServoRings(ActuatorKind):
     flank, so its play alone is not felt; ``backlash_m`` is what a servo loses where it reverses, because its position
     sensor has play or its controller ignores small errors.
 
-    A direct-current motor (``no_load_speed_m_per_s``) winds the more slowly the more it pulls, and what it takes from
-    its battery is recorded. With ``cable_friction``, force limits are those at the motor, and a ring feels the mean
-    tension round it; that friction also holds a cable that is pulled out, which this leaves away.
+    With ``cable_friction``, force limits are those at the motor, and a ring feels the mean tension round it; that
+    friction also holds a cable that is pulled out, which this leaves away.
     """
 
     cites: ClassVar[tuple[tuple[str, str], ...]] = (("riddle2025models", "the position servos"),)
@@ -55,11 +53,6 @@ class ServoRings(ActuatorKind):
         default=13.0, description="tension at which a servo stalls, one number for all or one per segment"
     )
     speed_limit_m_per_s: Positive = Field(default=0.064, description="fastest winding and paying out")
-    no_load_speed_m_per_s: Positive | None = Field(
-        default=None,
-        description="speed of winding without tension, which falls in proportion to tension to 0 at the force limit; "
-        "records motor_energy (not set: the speed limit up to the force limit)",
-    )
     backlash_m: NonNegative = Field(
         default=0.0,
         description="length of cable that is lost where winding reverses: a servo stands still within half of it about "
@@ -76,11 +69,7 @@ class ServoRings(ActuatorKind):
     def findings(self, body: MeshBody) -> Iterator[Finding]:
         """Checks the cables' range against the ring at rest, and their force against the mesh."""
         for low, high, force_N in self.strongest(body.n_segments):
-            yield from _findings(body, self, low, high, force_N / self._wrap_factors[0])
-
-    @property
-    def _wrap_factors(self) -> tuple[float, float]:
-        return wrap_factors(self.cable_friction or 0.0)
+            yield from _findings(body, self, low, high, force_N / wrap_factors(self.cable_friction or 0.0)[0])
 
     def add(self, spec: mujoco.MjSpec, name: str, span_m: list[float], force_N: float) -> None:
         """Adds a cable whose slack length is the engine's state, and its rate the control."""
@@ -102,7 +91,7 @@ class ServoRings(ActuatorKind):
             actlimited=True,
             actrange=span_m,
             forcelimited=True,
-            forcerange=[-force_N / self._wrap_factors[0], 0.0],
+            forcerange=[-force_N / wrap_factors(self.cable_friction or 0.0)[0], 0.0],
         )
 
     def slopes(self, model: mujoco.MjModel) -> Slopes:
@@ -114,20 +103,6 @@ class ServoRings(ActuatorKind):
             return self.stiffness_N_per_m * pulls, self.damping_Ns_per_m * pulls
 
         return slopes
-
-    def motor_power(self, model: mujoco.MjModel) -> MotorPower | None:
-        """Returns what motors with a speed without load take, by `motor_power_W` at the motor's end of the cable."""
-        speed = self.no_load_speed_m_per_s
-        if speed is None:
-            return None
-        inwards, outwards = self._wrap_factors
-        stall_N = -inwards * model.actuator_forcerange[:, 0]
-
-        def power_W(tension_N: Array, shortening_m_per_s: Array) -> Array:
-            force_N = tension_N * np.where(shortening_m_per_s < 0.0, outwards, inwards)
-            return motor_power_W(force_N, shortening_m_per_s, stall_N, speed)
-
-        return power_W
 
     def first_act(self, model: mujoco.MjModel) -> Array:
         """Returns the slack lengths of cables that are paid out, m."""
@@ -151,14 +126,11 @@ class ServoRings(ActuatorKind):
         stalled = np.minimum(length_m - limits_N / self.stiffness_N_per_m, longest)
         # One by one, so that commands that are given together come to the same bits as single ones.
         for command in activation:
-            commanded, winding = longest + command * (shortest - longest), speed
+            commanded = longest + command * (shortest - longest)
             if play:
                 commanded = state.clip(commanded - play, commanded + play)
-            if self.no_load_speed_m_per_s is not None:
-                share = (self.stiffness_N_per_m * (length_m - state) / limits_N).clip(0.0, 1.0)
-                winding = np.minimum(speed, self.no_load_speed_m_per_s * (1.0 - share))
             aim = np.maximum(commanded, stalled) - state
-            wound = np.minimum(np.maximum(aim, -winding * time_s), speed * time_s)
+            wound = np.minimum(np.maximum(aim, -speed * time_s), speed * time_s)
             state = (state + wound).clip(shortest, longest)
         return state
 
@@ -178,22 +150,6 @@ def wrap_factors(friction: float) -> tuple[float, float]:
     if friction == 0.0:
         return 1.0, 1.0
     return friction / -expm1(-friction), friction / expm1(friction)
-
-
-def motor_power_W(
-    force_N: Array, speed_m_per_s: Array, stall_force_N: ArrayLike, no_load_speed_m_per_s: float
-) -> Array:
-    """Computes the electrical power of direct-current motors, W: ``max(0, F v + F^2 v0 / F0)``.
-
-    It is the mechanical power and the heat of the current; nothing is given back.
-
-    Args:
-        force_N: Force of every cable at its motor, F, in any shape.
-        speed_m_per_s: Speed v at which it shortens, likewise.
-        stall_force_N: Force F0 at which a motor stands still, one for all or in that shape.
-        no_load_speed_m_per_s: Speed v0 without load.
-    """
-    return (force_N * speed_m_per_s + force_N**2 * no_load_speed_m_per_s / np.asarray(stall_force_N)).clip(0.0)
 
 
 def _findings(body: MeshBody, rings: ServoRings, low: float, high: float, force_N: float) -> Iterator[Finding]:

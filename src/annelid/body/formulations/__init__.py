@@ -109,21 +109,14 @@ class FormulationKind(Kind):
 
     @abstractmethod
     def mechanics(
-        self,
-        model: mujoco.MjModel,
-        data: mujoco.MjData,
-        geometry: MeshGeometry,
-        body: MeshBody,
-        arena: ArenaKind,
-        step_s: float,
+        self, model: mujoco.MjModel, data: mujoco.MjData, body: MeshBody, arena: ArenaKind, step_s: float
     ) -> Mechanics:
         """Returns what steps a body that `add` has built for a plant.
 
         Args:
             model: The compiled body.
             data: The engine's data of it.
-            geometry: The mesh at rest.
-            body: Materials and pins.
+            body: The mesh, materials and pins.
             arena: Where it is.
             step_s: Physics step, s.
         """

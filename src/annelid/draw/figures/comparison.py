@@ -1,8 +1,8 @@
-"""Runs overlaid: lengths of rings and segments, potentials, and where they went."""
+"""Runs overlaid: lengths of rings and segments, and where they went."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,7 +10,6 @@ import numpy as np
 
 from annelid.analysis.track import forward_position
 from annelid.draw.canvas import canvas, line_entries, line_looks, panel_title, save
-from annelid.draw.plots import neuron_potentials
 from annelid.errors import RunFileError
 from annelid.protocols import Array
 from annelid.simulation.runfile import Run
@@ -22,8 +21,6 @@ MOST_ROWS = 6  # segments that get a panel: of more, as many from the first to t
 _CM = 100.0
 
 Values = Array | None  # one column per segment, ``(n_times, n_segments)``; None if they were not recorded
-Curves = Callable[["Run"], Sequence[tuple[Values, float | None]]]
-"""What is drawn of a run, each with the width of its lines."""
 
 
 def lengths_figure(runs: Sequence[Run], labels: Sequence[str], path: Path) -> Path:
@@ -33,29 +30,30 @@ def lengths_figure(runs: Sequence[Run], labels: Sequence[str], path: Path) -> Pa
         runs: The runs.
         labels: A short name of each.
         path: File to write; its suffix chooses the format.
+
+    Raises:
+        RunFileError: None of the runs recorded lengths.
     """
-    panels: dict[str, Curves] = {
-        "Segment, longer than at rest (cm)": lambda run: [(_elongation(run), None)],
-        "Ring (% of its longest)": lambda run: [(_rings(run), None)],
-    }
-    return _over_time(runs, labels, panels, "lengths of segments or rings", path)
-
-
-def potentials_figure(runs: Sequence[Run], labels: Sequence[str], path: Path) -> Path:
-    """Draws the potentials of each segment's half-centre: contraction neurons thick, expansion neurons thin.
-
-    Args:
-        runs: The runs.
-        labels: A short name of each.
-        path: File to write; its suffix chooses the format.
-    """
-    panels: dict[str, Curves] = {
-        "Half-centres, above rest (mV); thick: contraction, thin: expansion": lambda run: [
-            (_potentials(run, "contraction"), 1.5),
-            (_potentials(run, "expansion"), 0.7),
-        ]
-    }
-    return _over_time(runs, labels, panels, "potentials of half-centres", path)
+    panels = {"Segment, longer than at rest (cm)": _elongation, "Ring (% of its longest)": _rings}
+    curves = [[of(run) for of in panels.values()] for run in runs]
+    drawn = [any(values is not None for values in of_run) for of_run in curves]
+    if not any(drawn):
+        raise RunFileError("none of these runs recorded lengths of segments or rings")
+    n_segments = max(run.config.body.n_segments for run, shown in zip(runs, drawn, strict=True) if shown)
+    segments = np.linspace(0, n_segments - 1, min(n_segments, MOST_ROWS)).round().astype(int)
+    with canvas(0.8 + 1.15 * len(segments)) as figure:
+        grid = figure.subplots(len(segments), len(panels), sharex=True, sharey="col", squeeze=False)
+        for i, (title, column) in enumerate(zip(panels, grid.T, strict=True)):
+            panel_title(column[0], title)
+            column[-1].set_xlabel("time (s)")
+            for run, of_run, look in zip(runs, curves, line_looks(len(runs)), strict=True):
+                for axes, segment in zip(column, segments, strict=True):
+                    if (values := of_run[i]) is not None and segment < values.shape[1]:
+                        axes.plot(run.data["time"].values, values[:, segment], **look)
+        for axes, segment in zip(grid[:, 0], segments, strict=True):
+            axes.set_ylabel(f"segment {segment + 1}")
+        _legend(figure, labels, drawn)
+        return save(figure, path)
 
 
 def travel_figure(runs: Sequence[Run], labels: Sequence[str], path: Path) -> Path:
@@ -94,30 +92,6 @@ def travel_figure(runs: Sequence[Run], labels: Sequence[str], path: Path) -> Pat
         return save(figure, path)
 
 
-def _over_time(runs: Sequence[Run], labels: Sequence[str], panels: Mapping[str, Curves], what: str, path: Path) -> Path:
-    """Draws a column for each kind of curve, and in it a panel for each segment."""
-    curves = [[of(run) for of in panels.values()] for run in runs]
-    drawn = [any(values is not None for column in of_run for values, _ in column) for of_run in curves]
-    if not any(drawn):
-        raise RunFileError(f"none of these runs recorded {what}")
-    n_segments = max(run.config.body.n_segments for run, shown in zip(runs, drawn, strict=True) if shown)
-    segments = np.linspace(0, n_segments - 1, min(n_segments, MOST_ROWS)).round().astype(int)
-    with canvas(0.8 + 1.15 * len(segments)) as figure:
-        grid = figure.subplots(len(segments), len(panels), sharex=True, sharey="col", squeeze=False)
-        for i, (title, column) in enumerate(zip(panels, grid.T, strict=True)):
-            panel_title(column[0], title)
-            column[-1].set_xlabel("time (s)")
-            for run, of_run, look in zip(runs, curves, line_looks(len(runs)), strict=True):
-                for values, width in of_run[i]:
-                    for axes, segment in zip(column, segments, strict=True):
-                        if values is not None and segment < values.shape[1]:
-                            axes.plot(run.data["time"].values, values[:, segment], **look, linewidth=width)
-        for axes, segment in zip(grid[:, 0], segments, strict=True):
-            axes.set_ylabel(f"segment {segment + 1}")
-        _legend(figure, labels, drawn)
-        return save(figure, path)
-
-
 def _elongation(run: Run) -> Values:
     """Mean lengthening of each segment's sensors, cm."""
     if "stretch_length" not in run.data:
@@ -133,11 +107,6 @@ def _rings(run: Run) -> Values:
     lengths = run.data["ring_length"].values
     whole = lengths.reshape(len(lengths), run.config.body.n_segments, -1).sum(axis=2)
     return 100.0 * whole / whole.max(axis=0)
-
-
-def _potentials(run: Run, role: str) -> Values:
-    found = neuron_potentials(run, role)
-    return np.stack([*found.values()], axis=1) if len(found) == run.config.body.n_segments else None
 
 
 def _centre(run: Run) -> Values:

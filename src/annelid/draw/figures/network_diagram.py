@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from io import StringIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +22,7 @@ from annelid.draw.canvas import WIDTH_IN, canvas, plain, save
 from annelid.draw.figures import RUN_FIGURES
 from annelid.draw.plots import plot_path
 from annelid.errors import RunFileError
-from annelid.nervous import Network
-from annelid.nervous.tables import Effect, effect_of
+from annelid.nervous import Connection, GapJunction, Network
 from annelid.simulation import Run, build_plant
 
 if TYPE_CHECKING:
@@ -31,6 +30,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Path2D = NDArray[np.complexfloating]
+Effect = Literal["excitatory", "inhibitory", "gap junction", "rectified gap junction"]
 
 SYMBOLS = {"contraction": "U1", "expansion": "U2", "sensory": "U3", "relay": "U4"}
 """The paper's symbols of the neurons of a segment, by the part of a neuron's name before its segment's number."""
@@ -111,6 +111,14 @@ def run_network_figure(run: Run, path: str | Path) -> Path:
 
 
 RUN_FIGURES.add("network", run_network_figure)
+
+
+def effect_of(network: Network, connection: Connection) -> Effect:
+    """Returns what a connection does: a reversal potential above its target's rest excites, another inhibits."""
+    kind = connection.kind
+    if isinstance(kind, GapJunction):
+        return "rectified gap junction" if kind.rectified else "gap junction"
+    return "excitatory" if kind.reversal_mV > network.neurons[connection.target].rest_mV else "inhibitory"
 
 
 def role_of(name: str) -> str:

@@ -64,13 +64,7 @@ class Chain(FormulationKind):
         add_chains(spec, geometry, body, arena, self.armature_kg_m2, pin, for_plant and arena.has_moving_planes)
 
     def mechanics(
-        self,
-        model: mujoco.MjModel,
-        data: mujoco.MjData,
-        geometry: MeshGeometry,
-        body: MeshBody,
-        arena: ArenaKind,
-        step_s: float,
+        self, model: mujoco.MjModel, data: mujoco.MjData, body: MeshBody, arena: ArenaKind, step_s: float
     ) -> Mechanics:
         """Returns the engine's own step, as `FormulationKind.mechanics`."""
         from annelid.body.formulations.chain.capsules import ChainMechanics

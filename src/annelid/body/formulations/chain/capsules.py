@@ -14,7 +14,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from annelid.arena.friction import skin_options
+from annelid.arena.friction import contact_options
 from annelid.body.actuation import crossing_site, mark_crossing
 from annelid.body.constraint_rows import add_row
 from annelid.body.formulations import densities_kg_per_m, stiffness_shares
@@ -47,9 +47,7 @@ def add_chains(
     spec.option.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE
     # The engine's default and that of the authors' files: weaker by 16 % at 45 degrees to the world's axes.
     spec.option.cone = mujoco.mjtCone.mjCONE_PYRAMIDAL
-    n, x = geometry.n_segments, geometry.vertices_m[0, :, 0]
-    places = x if spheres else (x[:-1] + x[1:]) / 2
-    contact = skin_options(arena, geometry, body.relative_frictions, places)
+    n, contact = geometry.n_segments, contact_options(arena)
     material, shares = body.strands.of_segment(0), stiffness_shares(geometry, body.strands)
     density = densities_kg_per_m(geometry, body.strands)
     for strand, vertices_m in enumerate(geometry.vertices_m):
@@ -69,7 +67,7 @@ def add_chain(
     strands: Strands,
     armature_kg_m2: float,
     *,
-    contact: list[dict[str, Any]] | None = None,
+    contact: dict[str, Any] | None = None,
     density_kg_per_m: Array | None = None,
     shares: Array | None = None,
     vertices_touch: bool = False,
@@ -80,8 +78,8 @@ def add_chain(
     """Adds one chain of capsules; element ``e`` is body ``<name>_<e>`` between vertices ``e`` and ``e + 1``.
 
     The tree grows from a root element, by default the middle one, which may be welded to the world (a cantilever).
-    Without contact attributes the chain touches nothing, else by its capsules, with attributes for each, or by spheres
-    at its vertices, ``(n_vertices, 3)``, with attributes for each of these. Mass per length of every element,
+    Without contact attributes the chain touches nothing, else by its capsules, or by spheres at its vertices,
+    ``(n_vertices, 3)``. Mass per length of every element,
     ``(n_elements,)``, and shares of the stiffness at every inner vertex, ``(2, n_elements - 1)``, are as of a rod.
     """
     n_elements = len(vertices_m) - 1
@@ -104,12 +102,12 @@ def add_chain(
             contype=0,
             conaffinity=0 if contact is None or vertices_touch else 1,
             rgba=rgba,
-            **(contact[element] if contact is not None and not vertices_touch else {}),
+            **(contact if contact is not None and not vertices_touch else {}),
         )
         if contact is not None and vertices_touch:
             own = {element, element + 1} if element == middle else {element, element + 1} - {joint_vertex}
             for vertex in sorted(own):
-                add_touch(link, strands.radius_m, contact[vertex], vertices_m[vertex] - place)
+                add_touch(link, strands.radius_m, contact, vertices_m[vertex] - place)
         return link
 
     first = add_element(spec.worldbody, middle, middle, np.zeros(3))

@@ -81,16 +81,10 @@ class Rods(FormulationKind):
         add_rods(spec, geometry, body, arena, self.edge_time_constant_s, self.tie, for_plant=for_plant)
 
     def mechanics(
-        self,
-        model: mujoco.MjModel,
-        data: mujoco.MjData,
-        geometry: MeshGeometry,
-        body: MeshBody,
-        arena: ArenaKind,
-        step_s: float,
+        self, model: mujoco.MjModel, data: mujoco.MjData, body: MeshBody, arena: ArenaKind, step_s: float
     ) -> Mechanics:
         """Returns what steps rods, as `FormulationKind.mechanics`."""
         from annelid.body.formulations.rods.mechanics import RodMechanics
 
         first_order = self.engine_share(arena) == 1.0
-        return RodMechanics(model, data, geometry, body, self.tie, step_s, first_order=first_order)
+        return RodMechanics(model, data, body, self.tie, step_s, first_order=first_order)

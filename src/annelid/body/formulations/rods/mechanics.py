@@ -14,7 +14,7 @@ from annelid.body.formulations.rods.strains import RodStrains, RodVertices, net_
 from annelid.body.formulations.rods.two_step import TwoStep
 from annelid.body.mechanics import Mechanics
 from annelid.body.mesh import MeshBody
-from annelid.morphology import Array, MeshGeometry, norm
+from annelid.morphology import Array, norm
 from annelid.protocols import State
 
 
@@ -30,7 +30,6 @@ class RodMechanics(Mechanics):
         self,
         model: mujoco.MjModel,
         data: mujoco.MjData,
-        geometry: MeshGeometry,
         body: MeshBody,
         tie: Tie | None,
         step_s: float,
@@ -41,6 +40,7 @@ class RodMechanics(Mechanics):
         # What the predicted end of a step has yet to move is nothing.
         super().__init__(model, data, 0.0)
         self._engine_lacks_s = step_s - model.opt.timestep
+        geometry = body.geometry()
         self.strains = RodStrains(model, net_stiffness(geometry, body.strands), body.strands.damping_time_s)
         self.two_step = TwoStep(model, data, self.strains, first_order=first_order)
         self._vertices, self._edges_per_m = RodVertices(model), 1.0 / model.flexedge_length0

@@ -18,7 +18,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from annelid.arena.friction import skin_options
+from annelid.arena.friction import contact_options
 from annelid.body.actuation import crossing_site, mark_crossing
 from annelid.body.constraint_rows import LEAST_INERTIA_KG_M2, add_held_coordinate, add_holder, add_tie
 from annelid.body.formulations import Tie, densities_kg_per_m
@@ -84,10 +84,9 @@ def _add_vertices(
     density_kg_per_m: Array,
 ) -> list[list[str]]:
     """Adds a body for every vertex, crossings first (which the solver is fastest with); returns each strand's names."""
-    n, x = geometry.n_segments, geometry.vertices_m[0, :, 0]
+    n, contact = geometry.n_segments, contact_options(arena)
     masses = lumped_masses(geometry.vertices_m[0], density_kg_per_m).tolist()
     pins_kg = geometry.along(body.pins.of_each("mass_kg", n), geometry.plane_x_m)
-    contact = skin_options(arena, geometry, body.relative_frictions, x)
     names = [[vertex_name(s, v) for v in range(len(masses))] for s in range(geometry.n_strands)]
     for crossing in range(geometry.n_crossings):
         name, vertex = crossing_site(crossing), geometry.crossing_vertex[geometry.crossing_plane[crossing]]
@@ -96,13 +95,13 @@ def _add_vertices(
         pin = add_vertex(spec, name, place, pin_kg + (2 * masses[vertex] if tie is None else 0.0))
         mark_crossing(pin, name, body.pins.radius_m, 0.0)
         if tie is None:
-            add_touch(pin, body.strands.radius_m, contact[vertex])
+            add_touch(pin, body.strands.radius_m, contact)
             for strand in strands:
                 names[strand][vertex] = name
             continue
         for strand in strands:
             point = add_vertex(spec, names[strand][vertex], place, masses[vertex])
-            add_touch(point, body.strands.radius_m, contact[vertex])
+            add_touch(point, body.strands.radius_m, contact)
             add_tie(spec, name, point.name, tie)
 
     between = np.setdiff1d(np.arange(len(masses)), geometry.crossing_vertex).tolist()
@@ -110,7 +109,7 @@ def _add_vertices(
         with _built_apart(spec, vertex_name(strand, "")) as part:
             for vertex in between:
                 point = add_vertex(part, str(vertex), geometry.vertices_m[strand, vertex], masses[vertex])
-                add_touch(point, body.strands.radius_m, contact[vertex])
+                add_touch(point, body.strands.radius_m, contact)
     return names
 
 

@@ -1,4 +1,10 @@
-"""The paper's controller with feedback from pressure, against slip."""
+"""The paper's controller with feedback from pressure, against slip; the design is our own.
+
+On a body with weight a contracting segment stretches its neighbour, whose stretch sensor then switches off too early:
+several segments contract at once, and the front drags along the ground. Three kinds of synapse onto sensory neurons,
+which keep a segment expanded and end its contraction, even the wave out, so that no segment leaves the ground before
+the one ahead has its length (the aim of Daltorio et al. 2013). Before the first segment comes the last.
+"""
 
 from __future__ import annotations
 
@@ -6,12 +12,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from annelid.config.run import RunConfig
-from annelid.control.circuit import Circuit
-from annelid.control.circuit_controller import CircuitKind
-from annelid.control.senses import Sense, Source
-from annelid.control.sns import Sns
-from annelid.nervous import peristalsis
+from annelid.config import RunConfig
+from annelid.control import Circuit, CircuitKind, Sense, Sns, Source
+from annelid.nervous import Network, Neuron, PeristalsisParameters, peristalsis_network
 
 Strength = Annotated[float, Field(ge=0, le=5)]
 LOAD_N = 2.5, 9.0
@@ -22,8 +25,46 @@ PRESSURE_MS = 30.0
 """Time constant of the pressure neurons."""
 
 
+def pressure_network(
+    n_segments: int,
+    p: PeristalsisParameters,
+    *,
+    hold: float,
+    release: float,
+    exchange: float,
+    pressure_ms: float = PRESSURE_MS,
+) -> Network:
+    """Builds the peristalsis network with pressure feedback of the strengths that `PressureSns` describes.
+
+    Neurons ``pressure_s`` and ``extension_s`` of every segment come behind those of `peristalsis_network`, with inputs
+    ``load_s`` and ``length_s`` of which ``Gm R`` nA is the full scale. On the ground, full pressure keeps a segment
+    expanded, stretched or not, and one that lands becomes an anchor. Of three segments the one two before is the next
+    one, so none exchanges.
+
+    Raises:
+        ConfigError: As `peristalsis_network`, or a strength beyond what the excitatory reversal can give.
+    """
+    network, leak = peristalsis_network(n_segments, p), p.leak_conductance_uS
+    segments = range(1, n_segments + 1)
+    for segment in segments:
+        network.add_neuron(f"pressure_{segment}", Neuron(pressure_ms * leak, leak))
+        network.add_neuron(f"extension_{segment}", p.leaky_neuron)
+    for segment in segments:
+        two_before = (segment - 3) % n_segments + 1
+        if hold > 0:
+            network.add_synapse(f"pressure_{segment}", f"sensory_{segment}", p.transmission(hold))
+        if exchange > 0 and n_segments > 3:
+            network.add_synapse(f"contraction_{segment}", f"sensory_{two_before}", p.transmission(exchange))
+        if release > 0:
+            synapse = p.inhibitory(release * p.conductances.relay_to_next_sensory)
+            network.add_synapse(f"extension_{segment}", f"sensory_{segment % n_segments + 1}", synapse)
+        network.add_input(f"load_{segment}", f"pressure_{segment}")
+        network.add_input(f"length_{segment}", f"extension_{segment}")
+    return network
+
+
 class PressureSns(CircuitKind):
-    """The synthetic nervous system with pressure feedback against slip: `annelid.nervous.peristalsis`.
+    """The synthetic nervous system with pressure feedback against slip.
 
     A segment that bears load stays expanded until the one before it is extended, and one that begins to contract ends
     the contraction two segments before; any of the three strengths may be 0. A segment's load is the sum of the forces
@@ -58,7 +99,7 @@ class PressureSns(CircuitKind):
     def circuit(self, config: RunConfig, n_segments: int) -> Circuit:
         """Returns the circuit, as `CircuitKind.circuit`."""
         strengths = self.model_dump(include={"hold", "release", "exchange"})
-        network = peristalsis.pressure_network(n_segments, self.network.design, **strengths, pressure_ms=PRESSURE_MS)
+        network = pressure_network(n_segments, self.network.design, **strengths)
         full_nA, inputs = self.network.full_nA, dict[str, Source]()
         for segment in range(n_segments):
             from_s = config.sensor.startup_hold_s if segment == 0 else 0.0

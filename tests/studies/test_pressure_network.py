@@ -9,11 +9,13 @@ import pytest
 
 from annelid import load_config
 from annelid.errors import ConfigError
-from annelid.nervous import peristalsis_network
-from annelid.nervous.peristalsis import pressure_network
+from annelid.nervous import PeristalsisParameters, peristalsis_network
 from annelid.protocols import Array
+from annelid_studies.pressure import pressure_network
 
 N = 4
+PAPER = PeristalsisParameters()
+CHOSEN: dict[str, Any] = {"hold": 1.0, "release": 1.8, "exchange": 0.8}
 ALONE: dict[str, Any] = {"hold": 0.0, "release": 0.0, "exchange": 0.0, "pressure_ms": 5.0}
 """No synapse of ours, and quick neurons."""
 REST, STRETCHED, EXTENDED = (20.0, 0.0), (0.0, 0.0), (0.0, 20.0)
@@ -22,7 +24,7 @@ REST, STRETCHED, EXTENDED = (20.0, 0.0), (0.0, 0.0), (0.0, 20.0)
 
 def sensory(load_nA: Array, lengths: list[tuple[float, float]], n_steps: int, **design: Any) -> Array:
     """Potentials of the sensory neurons after steps of 1 ms under the same currents, mV."""
-    network, of_inputs = pressure_network(N, **design), dict[str, float]()
+    network, of_inputs = pressure_network(N, PAPER, **(CHOSEN | design)), dict[str, float]()
     for segment, (stretch, length) in enumerate(lengths, start=1):
         of_inputs |= {f"stretch_{segment}": stretch, f"length_{segment}": length}
         of_inputs[f"load_{segment}"] = load_nA[segment - 1]
@@ -55,16 +57,15 @@ def test_an_extended_segment_lets_the_next_one_go_loaded_or_not(load_nA: float) 
 
 
 def test_without_conductances_it_is_the_papers_network() -> None:
-    assert pressure_network(N, **ALONE).connections == peristalsis_network(N).connections
+    assert pressure_network(N, PAPER, **ALONE).connections == peristalsis_network(N).connections
     # Of three segments two before would be the next one.
-    assert pressure_network(3, hold=0.0, release=0.0).connections == peristalsis_network(3).connections
+    assert pressure_network(3, PAPER, **(ALONE | {"exchange": 0.8})).connections == peristalsis_network(3).connections
 
 
 def test_what_does_not_fit_is_refused(subtests: pytest.Subtests) -> None:
-    section = {"controller": {"kind": "sns-pressure"}}
-    for make, words in (
-        (lambda: pressure_network(3, hold=-1.0), "hold must be at least 0, not -1"),
-        (lambda: load_config("riddle2022-planar", section), "needs the touch of a skin"),
+    for changes, words in (
+        ({"controller": {"kind": "sns-pressure"}}, "needs the touch of a skin"),
+        ({"controller": {"kind": "sns-pressure", "hold": -1.0}}, "hold = -1.0: must be at least 0"),
     ):
         with subtests.test(words), pytest.raises(ConfigError, match=words):
-            make()
+            load_config("riddle2022-planar", changes)

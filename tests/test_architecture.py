@@ -230,7 +230,7 @@ def test_a_run_comes_to_its_table_without_what_only_pictures_and_studies_need(tm
         [sys.executable, "-c", program], capture_output=True, text=True, check=False, timeout=120, env=quiet
     )
     assert done.returncode == 0, done.stderr
-    assert "quantity" in done.stdout
+    assert "this run" in done.stdout
 
 
 ROOMS = ["annelid", *sorted(f"annelid.{path.parent.name}" for path in SOURCE.glob("*/__init__.py"))]
@@ -243,7 +243,8 @@ def test_every_public_name_can_be_had_and_documents_its_arguments_and_errors() -
         for name in getattr(module, "__all__", ()):
             function = getattr(module, name)
             if not inspect.isfunction(function):
-                assert function is not None
+                # A module of the room with the same name would hide what is loaded on first use.
+                assert not inspect.ismodule(function), f"{room}.{name}"
                 continue
             text, own = inspect.getdoc(function) or "", list(inspect.signature(function).parameters)
             _, stands, arguments = text.partition("Args:")

@@ -27,10 +27,11 @@ def test_run_ends_with_table_file_and_pictures(annelid: Command) -> None:
     assert done.exit_code == 0, done.err
     folder = Path("runs/riddle2022-planar-001")
     assert sorted(p.name for p in folder.iterdir()) == ["figure7.png", "frame.png", "run.nc", "video.mp4"]
-    assert all(str(folder / name) in done.out for name in ("run.nc", "figure7.png", "frame.png", "video.mp4"))
-    paths = [line for line in done.out.splitlines() if line.startswith("runs")]
-    assert [Path(path).name for path in paths] == ["run.nc", "figure7.png", "frame.png", "video.mp4"]
-    assert "riddle2022-planar: 4 segments, 0.5 s, complete" in done.out
+    lines = done.out.splitlines()
+    assert lines[0].startswith("riddle2022-planar: the planar worm")
+    assert lines[0].endswith(", 4 segments, 0.5 s")
+    assert lines[-1] == f"files in {folder}: run.nc figure7.png frame.png video.mp4"
+    assert len(lines) <= 20
     config = open_run(folder).config
     assert (config.body.n_segments, config.duration_s, config.seed) == (4, 0.5, 7)
 
@@ -116,14 +117,13 @@ def test_a_network_file_is_exported_and_kept_without_force(annelid: Command) -> 
 
 @pytest.mark.usefixtures("undrawn")
 def test_a_level_of_fidelity_resolves_the_worm_as_asked(annelid: Command) -> None:
-    run = ("run", "--fidelity", "accurate", "--duration", "0.02", "--no-video", "--out", "accurate")
-    done = annelid(*run)
+    run = ("riddle2023-rods", "--fidelity", "accurate", "--duration", "0.02", "--no-video", "--out", "accurate")
+    done = annelid("run", *run)
     assert done.exit_code == 0, done.err
-    assert "--fidelity without a preset takes riddle2023-rods" in done.sentence()
     config = open_run(Path("accurate")).config
     assert config.name == "riddle2023-rods"
     assert config == load_config("riddle2023-rods", {"duration_s": 0.02}, fidelity="accurate")
-    refused = annelid("run", "--fidelity", "paper", "--no-video", "--out", "paper")
+    refused = annelid("run", "riddle2023-rods", "--fidelity", "paper", "--no-video", "--out", "paper")
     assert "annelid run riddle2023" in refused.sentence()
     assert not Path("paper").exists()
 
@@ -133,12 +133,15 @@ def test_the_first_run_is_the_worm_with_soft_pins_and_says_what_it_compares_with
     done = annelid("run", "--duration", "0.02", "--no-video", "--out", "first")
     assert done.exit_code == 0, done.err
     assert open_run(Path("first")).config == load_config("riddle2023-fast", {"duration_s": 0.02})
-    words = " ".join(done.out.split())
-    assert "reference" in words
-    assert "deviation" in words
-    assert "this run differs from riddle2023-fast in duration_s" in words
+    first, *lines = done.out.splitlines()
+    assert first == "riddle2023-fast: the paper's worm with soft crossings, 3 segments, 0.02 s"
+    assert lines[0].split() == ["this", "run", "reference", "off", "by"]
+    assert "differs from riddle2023-fast in duration_s" in " ".join(lines)
+    assert "annelid show first --all" in done.out
+    assert lines[-1] == "files in first: run.nc"
     longer = annelid("check", "--segments", "4")
-    assert "--segments without a preset takes riddle2023-rods" in longer.sentence()
+    assert longer.exit_code == 2
+    assert "next: annelid check --segments 4 riddle2023-rods" in longer.sentence()
 
 
 def test_presets_lists_prints_and_explains(annelid: Command) -> None:

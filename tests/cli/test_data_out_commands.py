@@ -67,7 +67,7 @@ def test_what_does_not_go_together_is_refused(annelid: Command, run: Path) -> No
 def test_compare_prints_a_table_and_draws_into_a_folder(annelid: Command, run: Path, finished: Path) -> None:
     done = annelid("compare", run, finished, "-o", "both")
     assert done.exit_code == 0, done.err
-    assert "order of contractions" in done.out
+    assert "\norder " in done.out
     assert "the configurations are the same" in done.out
     assert sorted(path.name for path in Path("both").iterdir()) == ["comparison.json", "lengths.png"]
     assert "travel.png not drawn" in done.sentence()

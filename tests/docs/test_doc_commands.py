@@ -192,7 +192,7 @@ def check_annelid(command: Command) -> None:
         arena = given.get("arena")
         if arena is None or not str(arena).endswith(".toml"):
             segments, fidelity = given.get("segments"), given.get("fidelity")
-            config_of(given["preset"], overrides, segments, fidelity, arena, given.get("uncertainty"))
+            config_of(given["preset"], overrides, segments, fidelity, arena)
     assert name in words
 
 

@@ -74,7 +74,6 @@ STALE: tuple[str, ...] = (
     "challenge_tune_5ms.csv",
     "challenge_wave_2ms.csv",
     "challenge_wave_5ms.csv",
-    "pipes.csv",
     "robustness_three_segments.json",
     "weak_middle.csv",
 )

@@ -113,9 +113,9 @@ TASKS = {
             "annelid run riddle2023-rods -o before",
             "annelid export-network riddle2023-rods --to toml -o network.toml",
             "annelid run riddle2023-rods --network network.toml -o after",
-            "annelid compare before after --potentials -o both",
+            "annelid compare before after -o both",
         ),
-        gives=("both/potentials.png",),
+        gives=("after/figure7.png", "both/lengths.png"),
     ),
     "sloped pipe": Task(
         "docs/tutorials/pipes.md",

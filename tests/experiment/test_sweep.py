@@ -221,7 +221,7 @@ def test_numbers_alone_may_be_kept_and_chosen(tmp_path: Path) -> None:
     data = annelid.sweep(
         study(ONE, keep="outcomes", outputs=["duration_s", "muscle_work_J"]).model_dump(by_alias=True), tmp_path
     )
-    assert {"duration_s", "muscle_work_J"} == set(data) - {"status", "reason", "run", "rhythm", "warnings"}
+    assert {"duration_s", "muscle_work_J"} == set(data) - {"status", "reason", "run", "rhythm", "warnings", "check"}
     assert not list(tmp_path.glob(f"runs/*/{FILE_NAME}"))
     assert data.duration_s.values == pytest.approx(0.2)
 
@@ -235,3 +235,14 @@ def test_items_are_picked_evenly_from_the_first_to_the_last(n: int, numbers: lis
     if len(chosen) > 1:
         assert (places[0], places[-1]) == (0, len(numbers) - 1)
         assert np.ptp(np.diff(places)) <= 1
+
+
+def test_an_interrupted_check_keeps_the_results(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("annelid.experiment.sweep.check_runs", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        annelid.sweep(study(ONE), tmp_path, check=1)
+    data = xr.load_dataset(tmp_path / "sweep.nc", engine="h5netcdf")
+    assert (data.status.item(), data.check.item()) == ("complete", "")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 from pathlib import Path
 
 import pytest
@@ -42,6 +43,25 @@ def test_a_sweep_ends_with_a_table_and_its_files(annelid: Command) -> None:
     assert [row["controller.scheme"] for row in rows] == ["euler", "heun"] * 2
     folders = {path.name for path in Path("out/runs").iterdir() if path.is_dir()}
     assert {row["run"] for row in rows if row["run"]} == folders
+
+
+@pytest.mark.usefixtures("runs_in_this_process")
+def test_a_check_says_which_runs_are_resolved_in_rows_words_and_json(
+    annelid: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of three complete runs the first and the last are checked; half the step moves them by 1 % and by 5 %."""
+    monkeypatch.setattr("annelid.experiment.convergence.RESOLVED", 0.03)
+    monkeypatch.setattr("annelid.experiment.sweep.sweep_figure", lambda *_: Path("sweep.png"))
+    grid, _, _ = SHORT.replace("1.0, 1e4", "0.3, 1.0, 1.4, 1e4").rpartition("[[vary]]")
+    Path("study.toml").write_text(grid)
+    words = ("sweep", "study.toml", "-o", "out", "--jobs", "1", "--check", "2")
+    assert "Checked 2 of 4 runs: not resolved: run 2; sweep.csv says what moves.\n" in annelid(*words).out
+    results = json.loads(annelid(*words, "--json").out)["results"]
+    first, second, third, fourth = [row["check"] for row in results["sweep.csv"]]
+    assert (first, second, fourth) == ("resolved", None, None)
+    assert third.startswith("these numbers move by more than 3 %: ")
+    assert "elongation (4.8 %)" in third
+    assert {number: one["resolved"] for number, one in results["check"].items()} == {"0": True, "2": False}
 
 
 def test_the_example_is_a_study_that_runs_after_its_first_line(annelid: Command) -> None:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from annelid.analysis.elongation import end_difference, interior_deficit, middle_deficit
     from annelid.analysis.energy import Energy, energy_balance
     from annelid.analysis.interval import CONFIDENCE, Estimate, mean_and_interval
-    from annelid.analysis.numbers import Number
+    from annelid.analysis.numbers import Number, three_digits
     from annelid.analysis.paper import (
         PAPER_ELONGATION_M,
         PAPER_END_DIFFERENCE,
@@ -70,6 +70,7 @@ __all__ = [
     "segment_activation",
     "stretches",
     "summary",
+    "three_digits",
     "track_of",
 ]
 

@@ -16,25 +16,28 @@ class Elongation:
     """How far segments elongate."""
 
     elongation_first_helix_pp_m: list[float | None] | None = number(
-        "elongation on the first helix, peak to peak", "elongation, first helix, pp", "cm", per_segment=True
+        "longest less shortest length at the first stretch sensor, which lies on the first helix or on the left side",
+        "sensor range",
+        "cm",
+        per_segment=True,
     )
     elongation_least_pp_m: list[float | None] | None = number(
-        "peak to peak of the sensor with which it is least", "elongation, least sensor, pp", "cm", per_segment=True
+        "sensor range of the segment's sensor at which it is least", "least sensor range", "cm", per_segment=True
     )
     elongation_most_pp_m: list[float | None] | None = number(
-        "peak to peak of the sensor with which it is most", "elongation, most sensor, pp", "cm", per_segment=True
+        "sensor range of the segment's sensor at which it is most", "most sensor range", "cm", per_segment=True
     )
     elongation_mean_max_m: list[float | None] | None = number(
-        "largest mean of the segment's sensors above rest", "elongation, mean, maximum", "cm", per_segment=True
+        "largest mean of the segment's stretch sensors above rest", "elongation", "cm", per_segment=True
     )
     middle_deficit: float | None = number(
-        "interior segments below the first, on the first helix", "middle below first, pp", "%"
+        "by how much interior segments stay below the first, at the first sensor", "middle deficit", "%"
     )
     middle_deficit_mean: float | None = number(
-        "interior segments below the first, mean of the sensors", "middle below first, mean", "%"
+        "by how much interior segments stay below the first, mean of the sensors", "middle deficit, mean", "%"
     )
     end_difference: float | None = number(
-        "last segment below the first, on the first helix", "last below first, pp", "%"
+        "by how much the last segment stays below the first, at the first sensor", "end difference", "%"
     )
 
 

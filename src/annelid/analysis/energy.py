@@ -18,13 +18,11 @@ class Energy:
     have (a planar one no weight) is None and counts as nothing; all is None where energies were not recorded.
     """
 
-    energy_muscle_work_J: float | None = number(
-        "net work of all muscles in the whole run", "muscles' net work, whole run", "J"
-    )
+    energy_muscle_work_J: float | None = number("net work of all muscles in the whole run", "muscles' net work", "J")
     energy_kinetic_J: float | None = number("gain of kinetic energy")
     energy_elastic_J: float | None = number("gain of the energy of strands and springs")
     energy_potential_J: float | None = number("gain of the energy of the weight")
-    energy_slip_J: float | None = number("lost to friction of what slides", "lost to slip, whole run", "J")
+    energy_slip_J: float | None = number("lost to friction of what slides", "lost to slip", "J")
     energy_constraints_J: float | None = number(
         "lost to contacts along their normal and to other constraints; soft contacts may give back"
     )

@@ -25,22 +25,18 @@ class Gait:
 
     start_s: float | None = number("beginning of the first complete cycle that counts")
     end_s: float | None = number("end of the last one")
-    cycles: int = number(
-        "number of complete cycles between them", "complete cycles after the first", digits=0, default=0
-    )
+    cycles: int = number("number of complete cycles between them", "complete cycles", default=0)
     gait_period_s: float | None = number("mean duration of these cycles")
     speed_m_per_s: float | None = number(
         "travel of the centre of mass towards the front over time, negative backwards", "speed", "cm/s"
     )
     speed_body_lengths_per_s: float | None = number(
-        "the same over the length of the body at rest", "speed in body lengths", "body lengths/s"
+        "speed over the length of the body at rest", "speed", "body lengths/s"
     )
-    stride_m: float | None = number("travel towards the front per cycle", "stride", "cm", digits=1)
-    stride_body_lengths: float | None = number(
-        "the same over the length of the body at rest", "stride in body lengths", "body lengths"
-    )
+    stride_m: float | None = number("travel towards the front per cycle", "stride", "cm")
+    stride_body_lengths: float | None = number("the same over the length of the body at rest", "stride", "body lengths")
     contact_duty: list[float] | None = number(
-        "share of the time in which the segment touches the ground", "on the ground", "%", digits=0, per_segment=True
+        "share of the time in which the segment touches the ground", "on the ground", "%", per_segment=True
     )
     slip_ratio: float | None = number(
         "sliding distance on the ground, mean of the segments, over the path of the centre of mass", "slip ratio", "%"
@@ -52,26 +48,24 @@ class Gait:
     )
     cost_of_transport: float | None = number(
         "positive work of the muscles over weight times path: what a muscle takes up is not regained",
-        "cost of transport, positive work",
-        digits=2,
+        "cost of transport",
     )
     cost_of_transport_net: float | None = number(
-        "the same with what they take up subtracted", "cost of transport, net work", digits=2
+        "net work of the muscles over weight times path: what they take up is subtracted", "cost of transport, net"
     )
     cost_of_transport_cables: float | None = number(
         "force times half of every change of length, over weight times path"
     )
     lateral_drift: float | None = number(
-        "travel sideways per travel towards the front, positive to the left", "drift to the left per travel", "%"
+        "travel sideways per travel towards the front, positive to the left", "drift to the left", "%"
     )
     heading_change_rad: float | None = number(
         "change of the heading from the first cycle to the last, positive to the left"
     )
     turning_radius_m: float | None = number(
         "radius of the circle through the track, positive to the left; none for a straight one",
-        "turning radius, left positive",
+        "turning radius",
         "m",
-        digits=2,
     )
 
     if not TYPE_CHECKING:

@@ -16,26 +16,22 @@ from annelid.protocols import Array
 class Muscles:
     """Forces of the muscles in all samples in which they are contracted, and their work in the whole run."""
 
-    contraction_force_median_N: float | None = number(
-        "median muscle force while contracted", "force while contracted, median", "N"
-    )
-    contraction_force_peak_N: float | None = number(
-        "largest recorded muscle force while contracted", "force while contracted, peak", "N"
-    )
+    contraction_force_median_N: float | None = number("median muscle force while contracted", "force", "N")
+    contraction_force_peak_N: float | None = number("largest recorded muscle force while contracted", "peak force", "N")
     segment_force_median_N: list[float | None] | None = number(
-        "median force of the segment's muscles while contracted", "force of each segment, median", "N", per_segment=True
+        "median force of the segment's muscles while contracted", "force by segment", "N", per_segment=True
     )
     segment_force_peak_N: list[float | None] | None = number(
-        "largest force of the segment's muscles while contracted", "force of each segment, peak", "N", per_segment=True
+        "largest force of the segment's muscles while contracted", "peak by segment", "N", per_segment=True
     )
     positive_work_J: list[float | None] | None = number(
         "work of the segment's muscles while it was positive; none of it is regained",
-        "positive work of each segment",
+        "positive work",
         "J",
         per_segment=True,
     )
     muscle_work_J: list[float | None] | None = number(
-        "net work of the segment's muscles", "net work of each segment", "J", per_segment=True
+        "net work of the segment's muscles", "net work", "J", per_segment=True
     )
 
 

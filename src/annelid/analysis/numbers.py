@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields
-from math import isfinite
+from math import floor, isfinite, log10
 from typing import Any
 
 import numpy as np
@@ -16,8 +16,10 @@ from numpy.typing import ArrayLike
 
 from annelid.config import unit_of
 
-_SHOWN = {"%": (100.0, 1), "cm": (100.0, 2), "cm/s": (100.0, 2), "mm": (1000.0, 1), "N": (1.0, 2), "J": (1.0, 2)}
-"""What tables multiply a number by to show it in a unit, and digits behind the point; elsewhere 1 and 3."""
+_FACTORS = {"%": 100.0, "cm": 100.0, "cm/s": 100.0, "mm": 1000.0}
+"""What tables multiply a number by to show it in a unit; elsewhere 1."""
+_LISTED = 4
+"""Up to as many values, one for each segment, are listed in a table; more are shown by their range and mean."""
 UNKNOWN = "-"
 """Printed where a run does not have a number."""
 
@@ -35,7 +37,6 @@ class Number:
         meaning: What it is, in a line.
         label: What a table calls it; empty where no table shows it.
         shown_unit: Unit in a table.
-        digits: Digits behind the point in a table.
         per_segment: Whether there is one for each segment.
         in_sweeps: Whether a sweep may output it.
     """
@@ -45,7 +46,6 @@ class Number:
     meaning: str
     label: str
     shown_unit: str
-    digits: int
     per_segment: bool
     in_sweeps: bool
 
@@ -57,20 +57,22 @@ class Number:
     @property
     def factor(self) -> float:
         """What a table multiplies it by."""
-        return _SHOWN.get(self.shown_unit, (1.0, 3))[0]
+        return _FACTORS.get(self.shown_unit, 1.0)
+
+    @property
+    def heading(self) -> str:
+        """What a table calls it, with its unit."""
+        return f"{self.label} ({self.shown_unit})" if self.shown_unit else self.label
 
     def text(self, value: Value) -> str:
-        """Writes a value of it, or one for each segment, as tables do; a dash for None."""
-        if value is None:
-            return UNKNOWN
-        if isinstance(value, Sequence):
-            digits = " / ".join(UNKNOWN if one is None else self._digits(one) for one in value)
-        else:
-            digits = self._digits(value)
-        return f"{digits} {self.shown_unit}".rstrip()
-
-    def _digits(self, value: float) -> str:
-        return f"{self.factor * value:z.{self.digits}f}"
+        """Writes a value of it in the unit of its heading, or a short list of one for each segment; a dash for None."""
+        if not isinstance(value, Sequence):
+            return UNKNOWN if value is None else three_digits(self.factor * value)
+        known = [one for one in value if one is not None]
+        if len(value) <= _LISTED or not known:
+            return " ".join(map(self.text, value)) if known else UNKNOWN
+        least, most, mean = map(self.text, (min(known), max(known), sum(known) / len(known)))
+        return f"{least} to {most}, mean {mean}"
 
 
 def number(
@@ -78,7 +80,6 @@ def number(
     label: str = "",
     unit: str = "",
     *,
-    digits: int | None = None,
     per_segment: bool = False,
     in_sweeps: bool = True,
     default: Any = None,
@@ -90,14 +91,12 @@ def number(
         meaning: What it is, in a line.
         label: What a table calls it; empty where no table shows it.
         unit: Unit in a table.
-        digits: Digits behind the point in a table; None for those of the unit.
         per_segment: Whether there is one for each segment.
         in_sweeps: Whether a sweep may output it.
         default: Value where it is not known.
         factory: Makes that value, where it is a list.
     """
-    digits = _SHOWN.get(unit, (1.0, 3))[1] if digits is None else digits
-    metadata = {"number": (meaning, label, unit, digits, per_segment, in_sweeps)}
+    metadata = {"number": (meaning, label, unit, per_segment, in_sweeps)}
     if factory is not None:
         return field(default_factory=factory, metadata=metadata)
     return field(default=default, metadata=metadata)
@@ -107,6 +106,15 @@ def numbers_of(section: type) -> dict[str, Number]:
     """Returns what a section itself declares, by name."""
     own = [each for each in fields(section) if each.name in section.__annotations__]
     return {each.name: Number(each.name, section, *each.metadata["number"]) for each in own}
+
+
+def three_digits(value: float) -> str:
+    """Writes a number with three significant digits; a whole one as it is, one far from 1 in powers of ten."""
+    if not isfinite(value) or (value == round(value) and abs(value) < 1e6):
+        return f"{value:z.0f}"
+    rounded = float(f"{value:.2e}")
+    digits = 2 - floor(log10(abs(rounded)))
+    return f"{rounded:.{max(digits, 0)}f}" if -4 < digits < 7 else f"{rounded:.3g}"
 
 
 def finite(value: float | None) -> float | None:

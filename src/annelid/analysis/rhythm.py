@@ -42,7 +42,7 @@ class Rhythm:
     wave: bool | None = number("whether the order is 1-2-..-N over and over; in a sweep 1 or 0")
     full_cycles: int = number("how many times N successive onsets ran 1-2-..-N", default=0)
     period_s: float | None = number("mean interval between successive contractions of a segment", "period", "s")
-    period_std_s: float | None = number("standard deviation of those intervals")
+    period_std_s: float | None = number("standard deviation of those intervals", "period, deviation", "s")
     rhythm_verdict: Verdict | None = number("ordered, disordered or silent; none if too short", in_sweeps=False)
     rhythm_reason: str | None = number("why, in a short phrase", in_sweeps=False)
     rhythm_regularity: float | None = number("how even the lags between neighbours are: 1 for an even wave")

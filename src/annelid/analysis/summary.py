@@ -25,12 +25,10 @@ class Mesh:
     """The extremes of what the body is made of."""
 
     ring_length_min_m: float | None = number(
-        "shortest ring during the run; of a planar worm the height of a rhombus", "shortest ring", "cm", digits=1
+        "shortest ring during the run; of a planar worm the height of a rhombus", "shortest ring", "cm"
     )
-    edge_strain_max: float | None = number("largest strain of any edge of a rod", "largest edge strain", "%", digits=3)
-    pin_gap_max_m: float | None = number(
-        "largest distance between two pinned strands", "largest pin gap", "mm", digits=2
-    )
+    edge_strain_max: float | None = number("largest strain of any edge of a rod", "largest edge strain", "%")
+    pin_gap_max_m: float | None = number("largest distance between two pinned strands", "largest pin gap", "mm")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -29,12 +29,8 @@ def forward_position(run: Run) -> Array:
 class Travel:
     """How far a worm came, along its initial heading."""
 
-    travel_m: float | None = number(
-        "displacement of the centre of mass, negative backwards", "travel forwards, centre of mass", "mm"
-    )
-    travel_path_m: float | None = number(
-        "length of its path forwards and backwards", "travel, forwards and backwards", "mm"
-    )
+    travel_m: float | None = number("displacement of the centre of mass, negative backwards", "travel", "mm")
+    travel_path_m: float | None = number("length of its path forwards and backwards", "travel to and fro", "mm")
 
 
 def travel(run: Run) -> Travel:

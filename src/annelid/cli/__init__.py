@@ -28,6 +28,7 @@ from annelid.cli.common import (
     print_paths,
     print_results,
     print_run,
+    print_worm,
     refuse_existing,
     runs_from,
 )
@@ -86,6 +87,7 @@ __all__ = [
     "print_paths",
     "print_results",
     "print_run",
+    "print_worm",
     "refuse_existing",
     "refuse_json",
     "runs_from",

@@ -3,28 +3,33 @@
 from __future__ import annotations
 
 import os
+import shlex
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from textwrap import shorten
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from annelid.cli.entry import EXIT_INTERRUPTED, complain, lock, typed_command
 from annelid.cli.json_output import give_files, records, wants_json
-from annelid.errors import RunFileError
+from annelid.errors import ConfigError, RunFileError
 
 if TYPE_CHECKING:
     from rich.table import Table
 
     from annelid.config import RunConfig
-    from annelid.experiment.check import Check
+    from annelid.experiment.convergence import Check
     from annelid.experiment.store import Store
     from annelid.live import Plot
     from annelid.simulation.runfile import Run
 
 FIRST_PRESET, RIGID_PRESET = "riddle2023-fast", "riddle2023-rods"
-"""What runs where no preset is named: the paper's worm with its soft crossings, or the one with rigid crossings."""
+"""The paper's worm, with its soft crossings, which runs where no preset is named, and with rigid crossings."""
+
+WIDTH = 80
+"""Characters of a line in the terminal."""
 
 
 def presets_from(typed: str) -> list[str]:
@@ -58,7 +63,7 @@ WORM = "Name of a preset, a TOML file, or a robot as MJCF (.xml)."
 Preset = Annotated[
     str | None,
     typer.Argument(
-        help=f"{WORM}  [default: {FIRST_PRESET}; with --segments, --fidelity or --uncertainty {RIGID_PRESET}]",
+        help=f"{WORM}  [default: {FIRST_PRESET}]",
         metavar="[PRESET|FILE.toml]",
         autocompletion=presets_from,
     ),
@@ -163,12 +168,8 @@ def config_of(
     segments: int | None = None,
     fidelity: str | None = None,
     arena: str | None = None,
-    uncertainty: int | None = None,
 ) -> RunConfig:
     """Loads a preset or a TOML file with what is changed in it; where none is named, that of the first run.
-
-    The worm of the first run is fitted to three segments, its own mesh and its own step: without a name, an option that
-    changes these takes the worm with rigid crossings instead, and says so.
 
     Args:
         preset: A preset or file, or None.
@@ -176,21 +177,22 @@ def config_of(
         segments: Number of segments.
         fidelity: Level of fidelity.
         arena: Where the worm is put.
-        uncertainty: Monte Carlo samples that the command makes, or None.
+
+    Raises:
+        ConfigError: Something is not allowed; or no worm is named for options that do not suit that of the first run.
     """
     from annelid.config import load_config
 
-    options = {"--segments": segments, "--fidelity": fidelity, "--uncertainty": uncertainty}
-    refitting = [option for option, value in options.items() if value is not None]
     # An empty name, as from an unset variable of a shell, must not pass for none.
-    source = (RIGID_PRESET if refitting else FIRST_PRESET) if preset is None else preset
+    source = FIRST_PRESET if preset is None else preset
+    for option, value in {"--segments": segments, "--fidelity": fidelity}.items():
+        if preset is None and value is not None:
+            fitted = f"{FIRST_PRESET}, which runs where no worm is named, is fitted to three segments and its mesh"
+            raise ConfigError(f"{option} {value}: {fitted}; next: {typed_command(RIGID_PRESET)}")
     if segments is not None:
         overrides |= {load_config(source).body.segments_field: segments}
     config = load_config(source, overrides, fidelity=fidelity, arena=arena)
     _say_unchanged(config, overrides, source, fidelity, arena)
-    if preset is None and refitting:
-        fitted = f"{FIRST_PRESET} is fitted to three segments, its mesh and its step"
-        complain(f"{refitting[0]} without a preset takes {RIGID_PRESET}: {fitted}")
     return config
 
 
@@ -278,31 +280,50 @@ def print_paths(paths: Iterable[Path]) -> None:
             typer.echo(path)
 
 
-def print_run(run: Run, *, quiet: bool = False, check: Check | None = None) -> None:
+def print_worm(config: RunConfig, *, quiet: bool = False) -> None:
+    """Prints in a line which worm it is, unless it is to be quiet.
+
+    Args:
+        config: Its configuration.
+        quiet: Whether nothing is printed.
+    """
+    if not quiet and not wants_json():
+        size = f", {config.body.n_segments} segments, {config.duration_s:g} s"
+        # What a summary has in brackets is how long it takes to compute.
+        what = f"{config.name}: {config.summary.partition(' (')[0]}".removesuffix(": ")
+        typer.echo(shorten(what, WIDTH - len(size), placeholder=" ..") + size)
+
+
+def print_run(run: Run, *, everything: bool = False, quiet: bool = False, check: Check | None = None) -> None:
     """Prints the numbers of a run unless it is to be quiet, those to compare with beside them, and what follows.
 
     A check adds how far each number moves, and its sentence at the end.
 
     Args:
         run: The run.
+        everything: All numbers; else what is asked first.
         quiet: Whether nothing is printed.
         check: What finer runs have found.
     """
     from annelid.analysis import summary
-    from annelid.draw.summary_table import closing_sentence, summary_table
+    from annelid.draw.summary_table import closing_sentence, duration_for_a_speed, legend, summary_table
     from annelid.terminal import Console
 
     numbers = summary(run)
     checked = {} if check is None else {"check.json": check.to_dict()}
     if give_files([run.path], {run.path.name: numbers.to_dict(), **checked}) or quiet:
         return
-    Console().print(summary_table(numbers, run.config, None if check is None else check.cell))
-    for doubt in run.warnings:
-        typer.echo(f"warning: {doubt}")
-    if closing := closing_sentence(numbers, run.config):
-        typer.echo(closing)
-    if check is not None:
-        typer.echo(check.sentence)
+    moved = None if check is None else check.cell
+    lines = [summary_table(numbers, run.config, everything=everything, moved=moved), legend(run.config)]
+    lines += [f"warning: {doubt}" for doubt in run.warnings]
+    lines += [closing_sentence(numbers, run.config), "" if check is None else check.sentence]
+    if not everything:
+        folder = shlex.quote(str(run.path.parent))
+        duration_s = duration_for_a_speed(numbers)
+        longer = f", or run it with --duration {duration_s}" if duration_s else ""
+        lines += [f"all numbers: annelid show {folder} --all; words: --explain ROW"]
+        lines += [f"next: annelid view {folder}{longer}"]
+    Console().print("\n".join(line for line in lines if line))
 
 
 def play(

@@ -24,6 +24,7 @@ from annelid.cli.common import (
     print_paths,
     print_results,
     print_run,
+    print_worm,
 )
 from annelid.cli.entry import EXIT_INTERRUPTED, command, complain, end_study, lock
 from annelid.cli.json_output import wants_json
@@ -122,7 +123,6 @@ def run_command(
     annelid run wang --uncertainty 8 --uncertainty-from mine/calibration.json
     """
     from annelid.config import load_config
-    from annelid.draw.gallery import draw_all
     from annelid.plausibility import refuse_nonsense
     from annelid.simulation.loop import simulate
     from annelid.simulation.runfile import FILE_NAME, open_run
@@ -143,7 +143,7 @@ def run_command(
     if network is not None:
         overrides |= {"controller.kind": "network", "controller.text": read_text(network, "the network")}
     if resume is None:
-        config = config_of(preset, overrides, segments, fidelity, arena, uncertainty)
+        config = config_of(preset, overrides, segments, fidelity, arena)
     elif (preset, segments, fidelity, arena, network) == (None,) * 5:
         config = load_config(open_run(resume).config.model_dump(), overrides)
     else:
@@ -153,11 +153,12 @@ def run_command(
     for doubt in refuse_nonsense(config):
         complain(f"warning: {doubt}")
     folder = locked_folder(out, config.name)
+    print_worm(config, quiet=quiet)
     result, checked = None, None
     try:
         if check or uncertainty is not None:
             from annelid.experiment import uncertainty as error_bars
-            from annelid.experiment.check import check as check_run
+            from annelid.experiment.convergence import check as check_run
             from annelid.experiment.progress import study_progress
 
             spread = error_bars.read_spread(uncertainty_from).but(_errors(vary))
@@ -190,13 +191,20 @@ def run_command(
     if done.status == "interrupted":
         complain(f"interrupted: what was computed is in {done.path}; continue it with: annelid run --resume {folder}")
         raise typer.Exit(EXIT_INTERRUPTED)
-    if not wants_json():
-        typer.echo(done.path)
+    if quiet and not wants_json():
+        print_paths([done.path])
     if result is not None:
         from annelid.experiment.uncertainty import uncertainty_table, write_uncertainty
 
         print_results(write_uncertainty(result), uncertainty_table(result), quiet=quiet)
-    print_paths(draw_all(done, folder, video=video, quiet=quiet, complain=complain))
+    # Only now: what draws is not to be loaded before the table.
+    from annelid.draw.gallery import draw_all
+
+    drawn = draw_all(done, folder, video=video, quiet=quiet, complain=complain)
+    if quiet or wants_json():
+        print_paths(drawn)
+    else:
+        typer.echo(f"files in {folder}: {' '.join(path.name for path in (done.path, *drawn))}")
     if result is not None:
         failed, stopped = (sum(one.status == status for *_, one in result.runs) for status in ("failed", "stopped"))
         end_study(len(result.runs), failed, folder / "uncertainty.json", stopped=stopped)

@@ -21,7 +21,9 @@ from annelid.cli.common import (
     play,
     print_paths,
     print_run,
+    print_worm,
     refuse_existing,
+    runs_from,
     worms_from,
 )
 from annelid.cli.entry import command, lock
@@ -35,20 +37,28 @@ if TYPE_CHECKING:
 
 @command("show", "See")
 def show_command(
-    run: RunPath,
+    run: Annotated[
+        Path | None, typer.Argument(metavar="RUN", help="A run's folder, or its run.nc.", autocompletion=runs_from)
+    ] = None,
+    everything: Annotated[bool, typer.Option("--all", help="Print all numbers, not only what is asked first.")] = False,
+    explain: Annotated[
+        str | None, typer.Option(metavar="ROW", help="Only say what this row or column of the tables means.")
+    ] = None,
     verify: Annotated[
         bool, typer.Option("--verify", help="Only check whether any byte of the file has changed since the run ended.")
     ] = False,
 ) -> None:
     """Print the numbers of a run.
 
-    Published numbers stand beside them where there are any.
+    Published numbers stand beside them where there are any. docs/reference/numbers.md explains all of them.
 
     A run that has ended contains a digest of all its bytes. Files up to 64 MB are compared with it whenever they are
     opened, larger ones only with --verify.
 
     \b
     annelid show runs/riddle2023-001
+    annelid show runs/riddle2023-001 --all
+    annelid show --explain "cost of transport"
     annelid show runs/riddle2023-001 --json | jq .period_s
     annelid show runs/riddle2023-001 --verify
     """
@@ -56,13 +66,24 @@ def show_command(
     from annelid.simulation.runfile import open_run, verify_run
 
     refuse_json(verify, "--verify")
+    if explain is not None:
+        from annelid.draw.summary_table import explained
+
+        rows = explained(explain)
+        if not give([dict(zip(("row", "name", "meaning"), row, strict=True)) for row in rows]):
+            for heading, name, meaning in rows:
+                typer.echo(f"{heading}: {meaning}{f'; in Python and --json {name}' if name else ''}")
+        return
+    if run is None:
+        raise typer.BadParameter("name a run, such as runs/riddle2023-fast-001: annelid list runs lists them")
     if verify:
         typer.echo(verify_run(run))
         return
     opened = open_run(run)
     if give(summary(opened).to_dict()):
         return
-    print_run(opened)
+    print_worm(opened.config)
+    print_run(opened, everything=everything)
     if opened.message:
         typer.echo(opened.message)
 

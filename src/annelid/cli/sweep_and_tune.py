@@ -30,6 +30,9 @@ def sweep_command(
     samples: Annotated[
         int | None, typer.Option(min=1, max=1_000_000, help="Samples to draw.  [default: as the study has it]")
     ] = None,
+    check: Annotated[
+        int, typer.Option(min=0, metavar="N", help="Runs to repeat at half the step and with one more element.")
+    ] = 0,
     example: Annotated[
         bool, typer.Option("--example", help="Print a study with comments, as a start for your own.")
     ] = False,
@@ -45,10 +48,14 @@ def sweep_command(
     cannot be built, or whose workers die repeatedly, is listed with its reason, and the sweep goes on. For several
     machines, docs/sweeps.md has recipes in Python.
 
+    With --check N, N complete runs, spread evenly over the sweep, run also at half the step and with one more element
+    a side. The last sentence names those that are not resolved; the column check of sweep.csv says what moves.
+
     \b
     annelid sweep --example > study.toml
     annelid sweep study.toml
     annelid sweep study.toml --samples 512
+    annelid sweep study.toml --check 4
     """
     refuse_json(example, "--example")
     if example:
@@ -59,14 +66,16 @@ def sweep_command(
     if study is None:
         raise typer.BadParameter("name a study: annelid sweep --example > study.toml  makes one to begin with")
     from annelid.config import load_study
-    from annelid.experiment.sweep import results_table, swept, write_results
+    from annelid.experiment.sweep import checked_sentence, results_table, swept, write_results
 
     loaded = load_study(study)
     if samples is not None:
         loaded = load_study(loaded.model_dump(by_alias=True) | {"samples": samples})
     with kept_runs(output, jobs=jobs, quiet=quiet) as store:
-        done = swept(loaded, output, executor=store.executor, progress=store.progress)
-    print_results(write_results(done), results_table(done), quiet=quiet)
+        done = swept(loaded, output, executor=store.executor, check=check, progress=store.progress)
+    sentences = [checked_sentence(done)] if check else []
+    results = {"check": {i: one.to_dict() for i, one in done.checks.items()}} if check else {}
+    print_results(write_results(done), results_table(done), *sentences, quiet=quiet, results=results)
     failed, stopped = (sum(run.status == status for run in done.runs) for status in ("failed", "stopped"))
     end_study(len(done.runs), failed, output / "sweep.csv", stopped=stopped)
 

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from annelid.draw.plots import figure7, plot_path
     from annelid.draw.render import DEFAULT_CAMERA, render_frame, render_video
     from annelid.draw.scene import Skeleton, WormScene, postures_of, render_still
-    from annelid.draw.summary_table import UNKNOWN, comparison_table, fields_table, framed_table
+    from annelid.draw.summary_table import UNKNOWN, aligned, comparison_table, fields_table, framed_table
 
 __all__ = [
     "CONTRACTED",
@@ -51,6 +51,7 @@ __all__ = [
     "Skeleton",
     "WormScene",
     "activation_color",
+    "aligned",
     "canvas",
     "comparison_table",
     "draw_lines",

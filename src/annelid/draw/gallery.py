@@ -20,7 +20,8 @@ VIDEO_TASK = "drawing the video"
 def draw_all(run: Run, folder: Path, *, video: bool, quiet: bool, complain: Callable[[object], None]) -> Iterator[Path]:
     """Draws ``figure7.png``, ``frame.png`` and ``video.mp4``, and yields the path of each once it is written.
 
-    ``complain`` is called with a sentence for each that could not be drawn.
+    Each is announced on stderr unless it is to be ``quiet``, and ``complain`` is called with a sentence for each that
+    could not be drawn.
     """
     frame_time = frame_time_s(run)
     frame_remedy = f"annelid draw {folder} --time {frame_time:g}"
@@ -37,6 +38,8 @@ def draw_all(run: Run, folder: Path, *, video: bool, quiet: bool, complain: Call
     if video:
         pictures.append((video_path.name, draw_video, f"annelid draw {folder} --video {video_path}"))
     for name, draw, remedy in pictures:
+        if not quiet:
+            print(f"drawing {name}", file=sys.stderr, flush=True)
         try:
             path = draw(folder / name)
         except (AnnelidError, OSError) as error:

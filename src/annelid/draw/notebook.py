@@ -20,9 +20,6 @@ from annelid.simulation.runfile import VIEWS, Run, open_run
 from annelid.text import printable
 
 VIDEO_NAME = "video.mp4"
-ELONGATIONS = ("elongation_first_helix_pp_m", "elongation_mean_max_m")
-HEADLINES = ("order", "wave", "period_s", *ELONGATIONS, "travel_m", "speed_m_per_s", "stride_m")
-"""Numbers of a run that are shown."""
 MOST_BYTES = 12_000_000
 """Largest file that is put into a page."""
 _LEFT = 'style="text-align:left"'
@@ -150,9 +147,9 @@ def _still(run: Run) -> str:
 
 def _numbers(run: Run) -> str:
     numbers = summary(run)
-    beside = legend(numbers, run.config)
+    beside = legend(run.config)
     header = ("quantity", "this run", *(COMPARED if beside else ()))
-    rows = summary_rows(numbers, run.config, HEADLINES)
+    rows = summary_rows(numbers, run.config)
     lines = "".join(
         f"<tr>{''.join(f'<td {_LEFT}>{_words(cell)}</td>' for cell in row[: len(header)])}</tr>" for row in rows
     )

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import pairwise
+from math import ceil
+from typing import TYPE_CHECKING, NamedTuple
 
 from rich import box
 from rich.table import Table
 
 from annelid.analysis.comparison import LACKING, Comparison, relative_difference
-from annelid.analysis.numbers import UNKNOWN, Value
+from annelid.analysis.numbers import UNKNOWN, Value, three_digits
 from annelid.analysis.paper import (
     ELONGATION_WITHIN,
     FORMULATION,
@@ -23,28 +25,48 @@ from annelid.analysis.paper import (
 )
 from annelid.analysis.summary import NUMBERS, Summary
 from annelid.config import toml_value
-from annelid.errors import listed, shortened
+from annelid.errors import ConfigError, listed, shortened, suggest
 
 if TYPE_CHECKING:
     from annelid.config import RunConfig
 
-MOST_CHARACTERS = 400
-"""Of a value in a table of fields; a scene has up to a million."""
-_ONSETS_SHOWN = 12
-COMPARED = ("reference", "deviation")  # headings of what stands beside our numbers
-NEXT = (
-    f"annelid run {FORMULATION} (that formulation itself, a minute), "
-    "riddle2023-rods (rigid crossings), wang (the robot)"
-)
-"""What to run after the first worm."""
-_IN_BRACKETS = {
-    "period_s": ("period_std_s", "std {}"),
-    "speed_m_per_s": ("speed_body_lengths_per_s", "{}"),
-    "stride_m": ("stride_body_lengths", "{}"),
+WIDTH = 80
+"""Characters of a line that tables keep to."""
+COMPARED = ("reference", "off by")  # headings of what stands beside our numbers
+MOVED = "moves by"
+_SEGMENTS_SHOWN, _ONSETS_SHOWN = 6, 9
+_RUNS_BESIDE_THE_FIRST = 2
+_CYCLES_FOR_A_SPEED = 4.5
+"""Periods of a run whose speed is read over three cycles: the first does not count, and half a period is spare."""
+_STANDS_M = 1e-5
+"""A shorter stride is none."""
+WORDS = {
+    "order": "the order in which segments contract, and how many times a wave ran from the first segment to the last",
+    "onsets (s)": "the times at which segments begin to contract, in that order",
+    "work goes to (%)": "what became of the muscles' net work: stored in the body, lost to slip on the ground, to "
+    "other forces of contacts and constraints, to damping, and to the error of the time step (below 0: it adds energy)",
+    "warnings": "what is doubtful about the run, a sentence each",
+    COMPARED[0]: f"a published number; with *: that of {FORMULATION}, our run of the paper's own formulation",
+    COMPARED[1]: "difference from the reference, in percent of it; of several segments the largest",
+    MOVED: "with --check: how far a number moves at half the step or with one more element a side; !: not resolved",
 }
-"""Numbers behind which another is printed in brackets."""
-_NO_ROW = {"duration_s", "energy_slip_J", *(name for name, _ in _IN_BRACKETS.values())}
-"""Numbers without a row of their own in the table of a run, which has them elsewhere."""
+"""Rows and columns that are no single number."""
+_PUBLISHED_ONLY = ("elongation_first_helix_pp_m", "middle_deficit", "end_difference")
+"""Numbers that the first table has only beside a published one."""
+FIRST = (
+    "order",
+    "period_s",
+    "speed_m_per_s",
+    "speed_body_lengths_per_s",
+    "travel_m",
+    "elongation_mean_max_m",
+    *_PUBLISHED_ONLY,
+    "contraction_force_median_N",
+    "cost_of_transport",
+    "work goes to (%)",
+    "warnings",
+)
+"""Rows of the first table of a run."""
 
 
 class Row(NamedTuple):
@@ -81,81 +103,122 @@ def framed_table(*headings: str, title: str | None = None, caption: str | None =
     return table
 
 
-def summary_table(numbers: Summary, config: RunConfig, moved: Callable[[str], str] | None = None) -> Table:
-    """Returns a run's numbers as a table for the terminal, those to compare with beside them.
+def aligned(rows: Sequence[Sequence[str]]) -> str:
+    """Lays cells out in columns, a line for each row; the last cell of a row may reach beyond its column."""
+    cells = [list(row[: max((i for i, cell in enumerate(row, start=1) if cell), default=0)]) for row in rows]
+    widths = [max((len(row[i]) for row in cells if len(row) > i + 1), default=0) for i in range(max(map(len, cells)))]
+    lines = ("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=False)) for row in cells)
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def summary_table(
+    numbers: Summary, config: RunConfig, *, everything: bool = False, moved: Callable[[str], str] | None = None
+) -> str:
+    """Returns a run's numbers as a table of 80 columns, those to compare with beside them.
 
     Args:
         numbers: The numbers.
         config: Configuration of the run.
+        everything: All rows; else those of `FIRST`.
         moved: Says how far a number, named as in `NUMBERS`, moves in finer runs; it adds a column.
     """
-    compared = COMPARED if references(config) else ()
-    duration = "" if numbers.duration_s is None else f", {numbers.duration_s:g} s"
-    title = f"{numbers.name}: {numbers.n_segments} segments{duration}, {numbers.status.replace('_', ' ')}"
-    caption = legend(numbers, config) if compared else None
-    checked = () if moved is None else ("moves by",)
-    table = framed_table("quantity", "this run", *checked, *compared, title=title, caption=caption)
-    for column, narrowest in zip(table.columns, (12, 16), strict=False):
-        column.min_width = narrowest
-    for name, (label, ours, *beside) in _rows(numbers, config).items():
-        table.add_row(label, ours, *(() if moved is None else (moved(name),)), *beside[: len(compared)])
-    return table
+    headings = ["", "this run", MOVED, *(COMPARED if references(config) else ())]
+    lines = [headings]
+    for name, (label, ours, *beside) in _rows(numbers, config, everything=everything).items():
+        further = "" if moved is None or getattr(numbers, name, None) is None else moved(name)
+        lines.append([label, ours, further, *beside])
+    return aligned(lines if moved is not None else [[*line[:2], *line[3:]] for line in lines])
 
 
-def summary_rows(numbers: Summary, config: RunConfig, only: Collection[str] | None = None) -> list[Row]:
+def summary_rows(numbers: Summary, config: RunConfig, *, everything: bool = False) -> list[Row]:
     """Returns the rows of a run's table in which there is a number, ours or one to compare with.
 
     Args:
         numbers: The numbers.
         config: Configuration of the run.
-        only: Names of the numbers wanted, as in `NUMBERS`; all for None.
+        everything: All rows; else those of `FIRST`.
     """
-    return [row for name, row in _rows(numbers, config).items() if only is None or name in only]
+    return list(_rows(numbers, config, everything=everything).values())
 
 
-def _rows(numbers: Summary, config: RunConfig) -> dict[str, Row]:
+def explained(row: str) -> list[tuple[str, str, str]]:
+    """Returns what a row or a column of the tables means: what tables call it, name of the number, meaning.
+
+    Args:
+        row: What a table calls it, with or without its unit, or the name of the number.
+
+    Raises:
+        ConfigError: No table has such a row.
+    """
+    known = [(heading, "", meaning) for heading, meaning in WORDS.items()]
+    known += [(one.heading, one.name, one.meaning) for one in NUMBERS.values() if one.label]
+    wanted = row.casefold().strip()
+    found = [
+        one for one in known if wanted in (one[0].casefold(), one[0].partition(" (")[0].casefold(), one[1].casefold())
+    ]
+    if not found:
+        raise ConfigError(f"no row is called {row!r}: {suggest(row, [heading for heading, *_ in known])}")
+    return found
+
+
+def _rows(numbers: Summary, config: RunConfig, *, everything: bool) -> dict[str, Row]:
     """Rows by the name of their number; those without any number are left out."""
     beside = references(config)
-    # A planar worm has one sensor per segment, and no name for it.
-    sensor = config.body.first_sensor
-    cells = {"order": ("segment at onset (s)", _onsets(numbers)), "wave": ("wave 1-2-..-N", _wave(numbers))}
-    # What is no section's own, such as the speed of computing, comes last.
-    for name, number in sorted(NUMBERS.items(), key=lambda one: one[1].section is Summary):
-        if name == "cycles" and not numbers.cycles:
-            continue
-        if number.label and name not in _NO_ROW and (sensor or ", mean" not in number.label):
-            label = number.label.replace("first helix", sensor) if sensor else number.label.replace(", first helix", "")
-            cells[name] = (label, _ours(name, numbers))
-        if name == "energy_muscle_work_J":
-            cells["energy"] = ("of which", _shares_of_the_work(numbers))
+    cells = {
+        "order": ("order", _order(numbers)),
+        "onsets (s)": ("onsets (s)", _onsets(numbers)),
+        **{name: (one.heading, one.text(getattr(numbers, name))) for name, one in NUMBERS.items() if one.label},
+        "work goes to (%)": ("work goes to (%)", _shares_of_the_work(numbers)),
+        "warnings": ("warnings", f"{len(numbers.warnings)}, below" if numbers.warnings else "none"),
+    }
+    if numbers.speed_m_per_s is None and numbers.travel_m is not None:
+        cells["speed_m_per_s"] = (NUMBERS["speed_m_per_s"].heading, _why_no_speed(numbers))
+    names = cells if everything else [one for one in FIRST if one not in _PUBLISHED_ONLY or one in beside]
     rows = {
-        name: Row(*cell, _theirs(name, beside.get(name)), _deviation(name, numbers, beside.get(name)))
-        for name, cell in cells.items()
+        name: Row(*cells[name], _theirs(name, beside.get(name)), _deviation(name, numbers, beside.get(name)))
+        for name in names
     }
     return {name: row for name, row in rows.items() if row.ours != UNKNOWN or row.reference}
 
 
-def _ours(name: str, numbers: Summary) -> str:
-    text = NUMBERS[name].text(getattr(numbers, name))
-    further, form = _IN_BRACKETS.get(name, ("", ""))
-    if further and (value := getattr(numbers, further)) is not None:
-        text += f" ({form.format(NUMBERS[further].text(value))})"
-    return text
+def _order(numbers: Summary) -> str:
+    if not numbers.order:
+        return "no contraction"
+    if numbers.wave:
+        times = f"{numbers.full_cycles} time{'' if numbers.full_cycles == 1 else 's'}"
+        return f"{_dashed(range(1, numbers.n_segments + 1))}, {times}"
+    return f"{_dashed(numbers.order)}, {'too short to judge' if numbers.wave is None else 'no wave'}"
+
+
+def _dashed(segments: Sequence[int]) -> str:
+    if len(segments) <= _SEGMENTS_SHOWN:
+        return "-".join(map(str, segments))
+    rising = all(b == a + 1 for a, b in pairwise(segments))
+    return f"{segments[0]}-{segments[1]}-..-{segments[-1]}" if rising else f"{_dashed(segments[:_SEGMENTS_SHOWN])}-.."
 
 
 def _onsets(numbers: Summary) -> str:
-    pairs = list(zip(numbers.order, numbers.onsets_s, strict=True))
-    onsets = ", ".join(f"{segment} at {time:.2f}" for segment, time in pairs[:_ONSETS_SHOWN])
-    return onsets + _and_more(pairs) or "none"
+    shown = " ".join(f"{time:.2f}" for time in numbers.onsets_s[:_ONSETS_SHOWN])
+    more = f" .. {numbers.onsets_s[-1]:.2f}" if len(numbers.onsets_s) > _ONSETS_SHOWN else ""
+    return shown + more or UNKNOWN
 
 
-def _and_more(items: Sequence[Any]) -> str:
-    return f", and {len(items) - _ONSETS_SHOWN} more" if len(items) > _ONSETS_SHOWN else ""
+def duration_for_a_speed(numbers: Summary) -> int | None:
+    """Returns how long a run should be for a speed that it does not have yet, s; None where that is not known.
+
+    A run without a period is taken to go on from segment to segment as it has begun.
+    """
+    onsets_s = numbers.onsets_s
+    if numbers.speed_m_per_s is not None or numbers.travel_m is None or len(onsets_s) < 2:
+        return None
+    period_s = numbers.period_s or numbers.n_segments * (onsets_s[-1] - onsets_s[0]) / (len(onsets_s) - 1)
+    duration_s = ceil(onsets_s[0] + _CYCLES_FOR_A_SPEED * period_s)
+    return duration_s if duration_s > onsets_s[0] + (numbers.duration_s or 0.0) else None
 
 
-def _wave(numbers: Summary) -> str:
-    times = f"{numbers.full_cycles} time{'' if numbers.full_cycles == 1 else 's'}"
-    return f"yes, {times}" if numbers.wave else "too short to judge" if numbers.wave is None else f"no ({times})"
+def _why_no_speed(numbers: Summary) -> str:
+    duration_s = duration_for_a_speed(numbers)
+    return "needs two cycles" + (f", better four: --duration {duration_s}" if duration_s else "")
 
 
 def _shares_of_the_work(numbers: Summary) -> str:
@@ -166,80 +229,151 @@ def _shares_of_the_work(numbers: Summary) -> str:
     parts = {
         "stored": kinetic + elastic + (numbers.energy_potential_J or 0.0),
         "slip": numbers.energy_slip_J,
-        "other constraints": numbers.energy_constraints_J,
+        "contact": numbers.energy_constraints_J,
         "damping": numbers.energy_damping_J,
-        "integrator": numbers.energy_numerical_J,
+        "step": numbers.energy_numerical_J,
     }
-    return ", ".join(f"{name} {100 * part / work:z.0f} %" for name, part in parts.items() if part is not None)
+    return ", ".join(f"{name} {100 * part / work:z.0f}" for name, part in parts.items() if part is not None)
 
 
-def comparison_table(comparison: Comparison) -> Table:
-    """Returns the numbers of runs side by side; below each but the first run's, the difference to it."""
-    caption = f"in brackets: difference to {comparison.labels[0]}; pp: peak to peak"
-    table = _side_by_side("quantity", comparison.labels, caption)
-    table.add_row("status", *(status.replace("_", " ") for status in comparison.statuses))
-    orders = ("-".join(map(str, order[:_ONSETS_SHOWN])) + _and_more(order) for order in comparison.orders)
-    table.add_row("order of contractions", *(order or UNKNOWN for order in orders))
-    for name, values in comparison.numbers.items():
-        if NUMBERS[name].label and any(value is not None for value in values):
-            shares = (_percents(share, lambda percent: f"{percent:+.1f}") for share in comparison.differences(name))
-            below = (f"\n({share})" if share else "" for share in shares)
-            texts = map(NUMBERS[name].text, values)
-            table.add_row(NUMBERS[name].label, *(text + more for text, more in zip(texts, below, strict=True)))
-    return table
+def comparison_table(comparison: Comparison, *, everything: bool = False) -> str:
+    """Returns the numbers of runs side by side, one in a cell, with the differences to the first run.
+
+    Args:
+        comparison: The runs.
+        everything: All numbers, and a row for each segment; else those of `FIRST`, and the mean of the segments.
+    """
+    keys = "\n".join(f"{i}: {label}" for i, label in enumerate(comparison.labels, start=1))
+    rows = dict(_compared(comparison, everything=everything))
+    words = {
+        "ended": [status.replace("_", " ") for status in comparison.statuses],
+        "order": [_dashed(order) or UNKNOWN for order in comparison.orders],
+    }
+    blocks = [keys]
+    for shown in _blocks(len(comparison.labels)):
+        lines = [["", *(str(i + 1) for i in shown), *(f"{i + 1} to 1" for i in shown[1:])]]
+        lines += [[heading, *(texts[i] for i in shown)] for heading, texts in words.items()]
+        for heading, (texts, values) in rows.items():
+            apart = (relative_difference(values[0], values[i]) for i in shown[1:])
+            differences = (f"{_signed(100 * one)} %" if isinstance(one, float) else "" for one in apart)
+            lines.append([heading, *(texts[i] for i in shown), *differences])
+        blocks.append(aligned(lines))
+    return "\n\n".join(blocks)
 
 
-def fields_table(comparison: Comparison) -> Table:
+def _compared(
+    comparison: Comparison, *, everything: bool
+) -> Iterator[tuple[str, tuple[list[str], list[float | None]]]]:
+    """Yields headings of rows, each with the numbers of all runs as text and as they are."""
+    first = [name for name in FIRST if name in comparison.numbers and name not in _PUBLISHED_ONLY]
+    for name in dict.fromkeys([*first, *(comparison.numbers if everything else ())]):
+        number, each = NUMBERS[name], [_listed(value) for value in comparison.numbers[name]]
+        columns: Mapping[str, list[float | None]] = {"": [one[0] if len(one) == 1 else _mean(one) for one in each]}
+        if number.per_segment and everything:
+            longest = max(map(len, each))
+            columns = {f" {i + 1}": [one[i] if i < len(one) else None for one in each] for i in range(longest)}
+        for segment, values in columns.items():
+            if number.label and any(value is not None for value in values):
+                mean = ", mean" if number.per_segment and not segment else ""
+                heading = number.heading.replace(number.label, f"{number.label}{segment}{mean}", 1)
+                yield heading, ([number.text(value) for value in values], values)
+
+
+def _listed(value: Value) -> list[float | None]:
+    return list(value) if isinstance(value, Sequence) else [value]
+
+
+def _mean(values: Sequence[float | None]) -> float | None:
+    known = [value for value in values if value is not None]
+    return sum(known) / len(known) if known else None
+
+
+def _blocks(n_runs: int) -> list[list[int]]:
+    """The first run with some others at a time, as many as fit beside it."""
+    others = range(1, n_runs)
+    return [[0, *others[i : i + _RUNS_BESIDE_THE_FIRST]] for i in range(0, n_runs - 1, _RUNS_BESIDE_THE_FIRST)]
+
+
+def fields_table(comparison: Comparison) -> str:
     """Returns the fields in which the configurations differ; of worms of different kinds only those that all have."""
     other_kinds = "body.kind" in comparison.fields
-    caption = "worms of different kinds: of body and arena only fields that all have; --json lists all"
-    table = _side_by_side("field of the configuration", comparison.labels, caption if other_kinds else None)
-    for field, values in comparison.fields.items():
-        if not (other_kinds and field.startswith(("body.", "arena.")) and LACKING in values):
-            texts = ("not set" if one is None else UNKNOWN if one is LACKING else toml_value(one) for one in values)
-            table.add_row(field, *(shortened(text, MOST_CHARACTERS) for text in texts))
-    return table
+    fields = {
+        field: ["not set" if one is None else UNKNOWN if one is LACKING else toml_value(one) for one in values]
+        for field, values in comparison.fields.items()
+        if not (other_kinds and field.startswith(("body.", "arena.")) and LACKING in values)
+    }
+    widest = max(map(len, fields), default=0)
+    blocks = []
+    for shown in _blocks(len(comparison.labels)):
+        most = max((WIDTH - widest) // len(shown) - 4, 6)
+        lines = [[field, *(shortened(values[i], most) for i in shown)] for field, values in fields.items()]
+        blocks.append(aligned([["", *(str(i + 1) for i in shown)], *lines]))
+    if other_kinds:
+        blocks.append("worms of different kinds: of body and arena only fields that all have; --json lists all")
+    return "\n\n".join(blocks)
 
 
 def _deviation(name: str, numbers: Summary, entry: Published | None) -> str:
-    """By how many percent our number, or that of each segment, is above the one to compare with.
+    """By how many percent our number, or that of the segment where it is most, is off the one to compare with.
 
     Empty for shares, speeds of computing and words, for the range over sensors, and where either number is lacking.
     """
     if entry is None or name in SPREAD or isinstance(entry.value, str) or NUMBERS[name].shown_unit in ("%", ""):
         return ""
-    return _percents(relative_difference(entry.value, getattr(numbers, name)), _signed)
+    shares = [one for one in _listed(relative_difference(entry.value, getattr(numbers, name))) if one is not None]
+    return f"{_signed(100 * max(shares, key=abs))} %" if shares else ""
 
 
-def legend(numbers: Summary, config: RunConfig) -> str:
+def legend(config: RunConfig) -> str:
     """Says where the numbers to compare with come from; empty where there are none."""
     beside = references(config)
     if not beside:
         return ""
-    places = ", ".join(dict.fromkeys(entry.place for entry in beside.values() if entry.paper != FORMULATION))
+    places = dict.fromkeys(entry.place for entry in beside.values() if entry.paper != FORMULATION)
+    sections = sorted(place.removeprefix("section ") for place in places if place.startswith("section "))
+    others = [place for place in places if not place.startswith("section ")]
+    where = ", ".join([*others, *([f"section{'s' * (len(sections) > 1)} {listed(sections)}"] if sections else [])])
     paper = next(entry.paper for entry in beside.values() if entry.paper != FORMULATION)
-    said = [f"pp: peak to peak. [P]: published, {paper}, {places}."]
-    if stands_for_the_papers(config):
-        said.append(f"Other references: {FORMULATION}, the paper's own formulation.")
-        said += [_about_rigid_crossings(numbers)] if config.body.has_rigid_crossings else []
-    return " ".join(said)
+    ours = f"; *: run of {FORMULATION}" if stands_for_the_papers(config) else ""
+    return f"reference: {paper}, {where}{ours}"
 
 
 def closing_sentence(numbers: Summary, config: RunConfig) -> str:
-    """Says what is changed of a preset, or whether a run reproduces the paper's own formulation; else nothing."""
+    """Says in a sentence what a run shows: how it stands to its references, or how its segments contract."""
+    if numbers.status != "complete":
+        return f"{numbers.status.replace('_', ' ')} after {three_digits(numbers.duration_s or 0.0)} s"
     if not references(config):
-        return ""
+        return _about_the_rhythm(numbers)
     preset, changed = changed_fields(config)
     if changed:
-        return f"this run differs from {preset} in {listed(changed)}: the references are those of the unchanged worm"
-    if not stands_for_the_papers(config) or config.body.has_rigid_crossings or numbers.status != "complete":
-        return ""
+        return f"differs from {preset} in {listed(changed)}; references are of the unchanged worm"
+    if not stands_for_the_papers(config):
+        return _about_the_rhythm(numbers)
+    if config.body.has_rigid_crossings:
+        return _about_rigid_crossings(numbers)
     apart, within = _apart_from_the_papers(numbers), f"within {100 * ELONGATION_WITHIN:g} %"
     if apart:
-        return f"{config.name} does not reproduce the paper's formulation {within}: {', '.join(apart)}; next: {NEXT}"
-    return (
-        f"{config.name} reproduces order, period and mean elongation of the paper's formulation {within}; next: {NEXT}"
-    )
+        return f"{config.name} does not reproduce the paper's formulation {within}: {', '.join(apart)}"
+    return f"reproduces order, period and elongation of the paper's formulation {within}"
+
+
+def _about_the_rhythm(numbers: Summary) -> str:
+    reason, verdict, stride_m = numbers.rhythm_reason, numbers.rhythm_verdict, numbers.stride_m
+    if reason is None:
+        return ""
+    said = f"the segments contract out of order: {reason}"
+    if verdict == "silent":
+        said = f"the rhythm stops: {reason}"
+    elif numbers.wave:
+        said = "the segments contract one after the other from front to rear"
+    elif verdict != "disordered":
+        said = f"the segments contract in {reason}" if verdict else "the run is too short to judge the order"
+    if stride_m is None:
+        return said
+    if abs(stride_m) < _STANDS_M:
+        return f"{said}; the worm stays in its place"
+    way = "forwards" if stride_m > 0 else "backwards"
+    return f"{said}; the worm moves {way} by {NUMBERS['stride_m'].text(abs(stride_m))} cm a cycle"
 
 
 def _apart_from_the_papers(numbers: Summary) -> list[str]:
@@ -253,49 +387,24 @@ def _apart_from_the_papers(numbers: Summary) -> list[str]:
     return [
         *([f"order {orders[0]} in place of {orders[1]}"] if numbers.order != theirs.order else []),
         *(
-            f"{name} {_percents(share, _signed) or 'unknown'}"
+            f"{name} {f'{_signed(100 * share)} %' if isinstance(share, float) else 'unknown'}"
             for name, share, within in compared
             if not isinstance(share, float) or abs(share) > within
         ),
     ]
 
 
-def _side_by_side(first: str, labels: Sequence[str], caption: str | None) -> Table:
-    table = framed_table(first, *labels, caption=caption)
-    for column in table.columns[1:]:
-        column.min_width = 10
-    return table
-
-
 def _theirs(name: str, entry: Published | None) -> str:
-    if entry is None:
-        return ""
-    source = "" if entry.paper == FORMULATION else " [P]"
-    if isinstance(entry.value, str):
-        return f"{entry.value}{source}"
-    return f"{NUMBERS[name].text(entry.value)}{source}"
+    if entry is None or isinstance(entry.value, str):
+        return "" if entry is None else str(entry.value)
+    return NUMBERS[name].text(entry.value) + ("*" if entry.paper == FORMULATION else "")
 
 
 def _about_rigid_crossings(numbers: Summary) -> str:
-    theirs = formulation()
-    shares = relative_difference(theirs.elongation_mean_max_m, numbers.elongation_mean_max_m)
-    known = [1.0 + share for share in shares if share is not None] if isinstance(shares, Sequence) else []
-    times = (
-        f"a segment elongates {sum(known) / len(known):.1f} times as far"
-        if known and numbers.period_s
-        else "segments elongate farther"
-    )
-    gap = f"{1e3 * (theirs.pin_gap_max_m or 0.0):.0f} mm"
-    theirs_give = f"{FORMULATION} has the paper's soft crossings, which part by up to {gap}"
-    return f"Here crossings are rigid, and {times}: {theirs_give}."
-
-
-def _percents(shares: Value, form: Callable[[float], str]) -> str:
-    """Writes a share, or one per segment, in percent; nothing where none is known."""
-    each = shares if isinstance(shares, Sequence) else [shares]
-    if all(share is None for share in each):
-        return ""
-    return f"{' / '.join(UNKNOWN if share is None else form(100 * share) for share in each)} %"
+    shares = _listed(relative_difference(formulation().elongation_mean_max_m, numbers.elongation_mean_max_m))
+    mean = _mean(shares) if numbers.period_s else None
+    times = "farther than" if mean is None else f"{1.0 + mean:.1f} times as far as"
+    return f"crossings are rigid: segments elongate {times} those of {FORMULATION}"
 
 
 def _signed(percent: float) -> str:

@@ -18,7 +18,7 @@ from annelid.lazy import lazy
 
 if TYPE_CHECKING:
     from annelid.experiment.case import SHEAR_OVER_YOUNG, Case, write_worm
-    from annelid.experiment.check import Check, check
+    from annelid.experiment.convergence import Check, check
     from annelid.experiment.executors import Processes, answers, end_after
     from annelid.experiment.finer_runs import finer_steps, more_elements
     from annelid.experiment.fingerprint import code_fingerprint, physics_fingerprint, room_of

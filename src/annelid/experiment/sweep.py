@@ -9,7 +9,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib.metadata import version
 from itertools import product
@@ -22,15 +22,24 @@ import pandas as pd
 import xarray as xr
 from rich.table import Table
 
-from annelid.analysis import NUMBERS, Number
+from annelid.analysis import NUMBERS, Number, three_digits
 from annelid.config import RunConfig, Study, Vary, field_paths, load_config, load_study, toml_value, unit_of
 from annelid.config.study import MOST_RUNS
 from annelid.draw.figures.sweep import sweep_figure, worded
 from annelid.errors import ConfigError, suggest
 from annelid.experiment.case import Case
+from annelid.experiment.convergence import Check, check_runs
 from annelid.experiment.executors import workers
 from annelid.experiment.progress import StudyProgress
-from annelid.experiment.search_space import Choice, Variable, from_unit, sampled, unit_samples, variables_of
+from annelid.experiment.search_space import (
+    Choice,
+    Variable,
+    from_unit,
+    sampled,
+    spread_evenly,
+    unit_samples,
+    variables_of,
+)
 from annelid.experiment.store import Done, Store
 from annelid.output import whole_file, write_csv
 from annelid.protocols import Array
@@ -48,12 +57,16 @@ N_SHOWN = 4
 """Numbers in the table and panels in the figure."""
 N_ENDS, N_FAILED = 3, 8
 """Rows of the table: from either end, and of reasons."""
-WORDS: Mapping[str, tuple[str, Callable[[Done], str]]] = {
-    "status": ("complete, stopped by a guard, or failed", lambda run: run.status),
-    "reason": ("why a run is not complete", lambda run: run.reason),
-    "rhythm": ("verdict on the rhythm", lambda run: "" if run.outcome is None else run.outcome.rhythm.verdict or ""),
-    "warnings": ("what is doubtful about a run", lambda run: " | ".join(run.warnings)),
-    "run": ("folder of the run", lambda run: "" if run.outcome is None else run.outcome.path.name),
+WORDS: Mapping[str, tuple[str, Callable[[Done, Check | None], str]]] = {
+    "status": ("complete, stopped by a guard, or failed", lambda run, _: run.status),
+    "reason": ("why a run is not complete", lambda run, _: run.reason),
+    "rhythm": ("verdict on the rhythm", lambda run, _: "" if run.outcome is None else run.outcome.rhythm.verdict or ""),
+    "warnings": ("what is doubtful about a run", lambda run, _: " | ".join(run.warnings)),
+    "check": (
+        "resolved, or what moves at half the step or with one more element a side",
+        lambda _, check: "" if check is None else "; ".join(check.faults) or "resolved",
+    ),
+    "run": ("folder of the run", lambda run, _: "" if run.outcome is None else run.outcome.path.name),
 }
 """What is said of each run beside its numbers, and what that is."""
 LONG_S = 100 * 3600.0
@@ -107,12 +120,14 @@ class Sweep:
         numbers: What is read from every run.
         runs: What became of the plan's points, in their order.
         folder: Folder of the results.
+        checks: What finer runs have found, by the number of the run; only of those that were checked.
     """
 
     plan: Plan
     numbers: tuple[Number, ...]
     runs: tuple[Done, ...]
     folder: Path
+    checks: Mapping[int, Check]
 
     @cached_property
     def values(self) -> dict[str, Array]:
@@ -135,7 +150,8 @@ class Sweep:
         columns: dict[str, Any] = {field: [label(values[field]) for values, _ in plan.points] for field in plan.fields}
         if REPEAT in plan.levels:
             columns["seed"] = [str(case.changes["seed"]) for _, case in plan.points]
-        columns |= {name: [said(run) for run in self.runs] for name, (_, said) in WORDS.items()}
+        checked = [(run, self.checks.get(i)) for i, run in enumerate(self.runs)]
+        columns |= {name: [said(*one) for one in checked] for name, (_, said) in WORDS.items()}
         for number in self.numbers:
             values = self.values[number.name]
             endings = [f"_{i + 1}" for i in range(values.shape[1])] if number.per_segment else [""]
@@ -206,6 +222,7 @@ def sweep(
     *,
     executor: Executor | None = None,
     jobs: int | None = None,
+    check: int = 0,
     progress: StudyProgress | None = None,
 ) -> xr.Dataset:
     """Computes a sweep, writes its results, and returns them.
@@ -217,42 +234,67 @@ def sweep(
         folder: Folder for ``sweep.nc``, ``sweep.csv``, a figure, and the runs, which a second call finds there.
         executor: Who computes the runs; None for processes of this machine.
         jobs: How many processes, by default one a core.
+        check: How many complete runs, spread evenly, run also at half the step and with one more element a side.
         progress: Called at the start and after every run.
 
     Returns:
         Every number of summary and gait with ``units`` and ``long_name``: along the varied fields of a grid, or along
         ``sample``; further along ``repeat`` and ``segment`` where there are such. ``status``, ``reason``, ``warnings``
-        and ``run`` say of each run whether it is complete, why not, what is doubtful about it, and its folder.
+        and ``run`` say of each run whether it is complete, why not, what is doubtful about it, and its folder;
+        ``check`` is "resolved" or what moves in finer runs, and empty where a run was not checked.
 
     Raises:
-        ConfigError: The study is refused, or all of its runs are.
+        ConfigError: The study is refused, or all of its runs are, or ``check`` is negative.
         ClusterError: The workers are lost for good; finished runs are kept.
         RunFileError: A file cannot be written.
-        KeyboardInterrupt: Finished runs are kept.
+        KeyboardInterrupt: Finished runs are kept, and the results if the check is interrupted.
     """
     with workers(executor, jobs) as given:
-        done = swept(load_study(study), Path(folder), executor=given, progress=progress)
+        done = swept(load_study(study), Path(folder), executor=given, check=check, progress=progress)
     write_results(done)
     return done.data
 
 
 def swept(
-    study: Study, folder: Path, *, executor: Executor | None = None, progress: StudyProgress | None = None
+    study: Study,
+    folder: Path,
+    *,
+    executor: Executor | None = None,
+    check: int = 0,
+    progress: StudyProgress | None = None,
 ) -> Sweep:
-    """Computes a sweep as `sweep` does, in a folder that the caller has locked; writes nothing but the runs."""
+    """Computes a sweep as `sweep` does, in a folder that the caller has locked.
+
+    Writes nothing but the runs and, before a check begins, the results without it.
+    """
+    if check < 0:
+        raise ConfigError(f"check = {check}: must be at least 0")
     numbers = chosen_numbers(study.outputs, study.rank)
     plan = plan_of(study)
-    done = Store(folder / RUNS, executor, study.keep, progress).finish([case for _, case in plan.points], "sweep")
+    cases = [case for _, case in plan.points]
+    store = Store(folder / RUNS, executor, study.keep, progress)
+    done = store.finish(cases, "sweep")
     if all(one.refused for one in done) and done[0].error is not None:
         raise done[0].error
-    found = Sweep(plan, numbers, tuple(done), folder)
+    found = Sweep(plan, numbers, tuple(done), folder, {})
     if study.rank is not None and study.rank not in (names := shown_numbers(found)):
         instead = f"the table and the figure begin with {names[0]}" if names else "there is no figure"
         warnings.warn(
             f"rank = {study.rank!r}: no run has a value of it, so {instead}; a longer duration_s may give one",
             stacklevel=2,
         )
+    if check:
+        write_results(found)
+        chosen = spread_evenly(check, [i for i, one in enumerate(done) if one.status == "complete"])
+        found = replace(found, checks=dict(zip(chosen, check_runs(store, [cases[i] for i in chosen]), strict=True)))
     return found
+
+
+def checked_sentence(sweep: Sweep) -> str:
+    """Says how many of the runs were checked, and names those that are not resolved."""
+    faults = [str(i) for i, one in sweep.checks.items() if not one.resolved]
+    found = f"not resolved: run {', '.join(faults)}; {ROWS} says what moves" if faults else "all resolved"
+    return f"Checked {len(sweep.checks)} of {len(sweep.runs)} runs{': ' + found if sweep.checks else ''}."
 
 
 def chosen_numbers(names: Sequence[str], rank: str | None) -> tuple[Number, ...]:
@@ -367,7 +409,7 @@ def results_table(sweep: Sweep) -> Table:
         order = numbers.dropna(subset=names[:1]).sort_values(names[0], ascending=False, kind="stable").index
         for rows in [order] if len(order) <= 2 * N_ENDS else [order[:N_ENDS], order[-N_ENDS:]]:
             for i in rows:
-                values = ("" if np.isnan(value) else f"{value:.4g}" for value in numbers.loc[i])
+                values = ("" if np.isnan(value) else three_digits(float(value)) for value in numbers.loc[i])
                 table.add_row(str(i), *sweep.rows.loc[i, varied], *values)
             table.add_section()
     return table

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from rich.table import Table
 
-from annelid.analysis import NUMBERS
+from annelid.analysis import NUMBERS, three_digits
 from annelid.config import RunConfig, Vary, field_value, fields_of, load_config, parse_assignments, toml_value
 from annelid.config.checking import check_section
 from annelid.draw.figures.experiments import pareto_figure, progress_figure
@@ -182,10 +182,9 @@ class Trial:
         return [one.value(self.judged) for one in objectives]
 
     @property
-    def numbers(self) -> list[str]:
-        """The numbers of its gait, each empty where there is none."""
-        found = (getattr(self.judged.gait, name, None) for name in SHOWN)
-        return ["" if number is None else f"{number:.4g}" for number in found]
+    def numbers(self) -> list[float | None]:
+        """The numbers of its gait; None where there is none."""
+        return [getattr(self.judged.gait, name, None) for name in SHOWN]
 
     def settings(self, task: Task) -> list[str]:
         """Returns the values of the varied fields; of the start, those of its configuration."""
@@ -355,7 +354,11 @@ def write_gait(task: Task, trial: Trial, command: str, path: Path) -> Path:
     lines = [
         f"Tuned by: {command} ({task.n_trials} trials, seed {task.seed})",
         f"Trial {trial.name}:",
-        *(f"  {labelled(name)}: {number}" for name, number in zip(SHOWN, trial.numbers, strict=True) if number),
+        *(
+            f"  {labelled(name)}: {three_digits(one)}"
+            for name, one in zip(SHOWN, trial.numbers, strict=True)
+            if one is not None
+        ),
         *(f"  before: {field} = {toml_value(field_value(before, field))}" for field in trial.values),
     ]
     write_worm(path, task.source, {"name": path.stem, "summary": task.title, **task.changes, **trial.values}, lines)
@@ -374,8 +377,8 @@ def results_table(task: Task, trials: Sequence[Trial]) -> Table:
     table = Table("trial", title=task.title, caption=caption)
     for trial in shown:
         table.add_column(trial.name, justify="right")
-    for row in zip(map(labelled, SHOWN), *(trial.numbers for trial in shown), strict=True):
-        table.add_row(*row)
+    for name, *values in zip(SHOWN, *(trial.numbers for trial in shown), strict=True):
+        table.add_row(labelled(name), *("" if one is None else three_digits(one) for one in values))
     table.add_section()
     fields = [variable.field for variable in task.variables]
     for row in zip(fields, *(trial.settings(task) for trial in shown), strict=True):

@@ -90,8 +90,7 @@ class Quantity:
     @property
     def label(self) -> str:
         """What it is called."""
-        segment = self.name.partition(".")[2]
-        return f"{self.number.label} {segment}".rstrip()
+        return f"{self.number.label} {self.name.partition('.')[2]}".rstrip()
 
     @property
     def errors(self) -> dict[str, float | None]:
@@ -126,14 +125,15 @@ class Quantity:
         if self.value is None:
             return UNKNOWN
         error = "" if self.total is None else f" +- {self.error_text(self.total)}"
-        return f"{self.number.factor * self.value:z.{self._digits}f}{error} {self.number.shown_unit}".rstrip()
+        shown = f"{self.number.factor * self.value:z.{self._digits}f}" if self.total else self.number.text(self.value)
+        return f"{shown}{error} {self.number.shown_unit}".rstrip()
 
     @property
     def _digits(self) -> int:
-        digits = self.number.digits
-        if not self.total:
-            return digits
-        return min(max(1 - floor(log10(self.number.factor * self.total)), 0), digits + 1)
+        """Digits behind the point that show two digits of the total error, or four of a value that is far larger."""
+        sizes = ((1, self.total), (3, self.value))
+        points = (digits - floor(log10(self.number.factor * abs(size))) for digits, size in sizes if size)
+        return max(0, min(points, default=0))
 
 
 @dataclass(frozen=True, slots=True)

@@ -60,8 +60,8 @@ def _head(run: Run) -> str:
 
 def _numbers(run: Run) -> list[str]:
     numbers = summary(run)
-    rows = summary_rows(numbers, run.config)
-    beside = legend(numbers, run.config)
+    rows = summary_rows(numbers, run.config, everything=True)
+    beside = legend(run.config)
     header = ["quantity", "this run", *(COMPARED if beside else ())]
     cells = [[words(word) for word in row[: len(header)]] for row in rows]
     below = [beside, closing_sentence(numbers, run.config)]

@@ -40,13 +40,14 @@ def compare_command(
     view: Annotated[
         bool, typer.Option("--view", help="With --map: play the run in the browser, with the log beside it.")
     ] = False,
+    everything: Annotated[bool, typer.Option("--all", help="Print all numbers, not only what is asked first.")] = False,
     force: Force = False,
 ) -> None:
     """Compare runs with each other, or a run with a measured log.
 
-    Prints the numbers of every run with their differences to the first, and the fields in which the configurations
-    differ. A dash means that the run lacks the number, so worms of any kinds can be compared. With -o it draws all runs
-    into one figure each: lengths.png and travel.png.
+    Prints the main numbers of every run (with --all all of them), their differences to the first run, and the fields
+    in which the configurations differ. A dash means that the run lacks the number, so worms of any kinds can be
+    compared. With -o it draws all runs into one figure each: lengths.png and travel.png.
 
     \b
     annelid compare runs/riddle2023-rods-001 runs/riddle2023-rods-002
@@ -80,7 +81,6 @@ def compare_command(
     from annelid.draw import comparison_table, fields_table, lengths_figure, travel_figure
     from annelid.output import write_json
     from annelid.simulation import open_run
-    from annelid.terminal import Console
 
     if len(runs) == 2 and runs[1].is_file() and runs[1].suffix != ".nc":
         _propose_map(*runs)
@@ -94,8 +94,8 @@ def compare_command(
     opened = [open_run(run) for run in runs]
     comparison = compare(opened)
     if not give(comparison.to_dict()):
-        Console().print(comparison_table(comparison))
-        Console().print(fields_table(comparison) if comparison.fields else "the configurations are the same")
+        typer.echo(comparison_table(comparison, everything=everything))
+        typer.echo(f"\n{fields_table(comparison) if comparison.fields else 'the configurations are the same'}")
     if output is None:
         return
     written = [write_json(output / "comparison.json", comparison.to_dict())]
@@ -127,7 +127,6 @@ def _compare_measured(
 ) -> None:
     from annelid.output import write_json
     from annelid.simulation import open_run
-    from annelid.terminal import Console
     from annelid_lab.logs import compare_with_log, read_map, read_measured
     from annelid_lab.logs.report import agreement_figure, agreement_table, measured_plots
 
@@ -140,7 +139,7 @@ def _compare_measured(
     run = open_run(files[0])
     found = compare_with_log(run, read_measured(files[1], read_map(log_map)), from_s=from_s)
     if not give(found.to_dict()):
-        Console().print(agreement_table(found))
+        typer.echo(agreement_table(found))
     for note in found.notes:
         complain(f"note: {note}")
     if output is not None:

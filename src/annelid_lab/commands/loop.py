@@ -22,6 +22,7 @@ from annelid.cli import (
     print_paths,
     print_results,
     print_run,
+    print_worm,
     wants_json,
 )
 
@@ -139,6 +140,7 @@ def loop_command(
         for link in links.values():
             link.close()
     run = driven.run
+    print_worm(config, quiet=quiet)
     print_run(run, quiet=quiet)
     if not wants_json():
         print_paths([run.path])

@@ -4,35 +4,27 @@ from __future__ import annotations
 
 from math import isnan
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from annelid.draw import UNKNOWN, canvas, framed_table, panel_title, save_both
+from annelid.analysis import three_digits
+from annelid.draw import UNKNOWN, aligned, canvas, panel_title, save_both
 from annelid.live import Curve, Plot
 from annelid_lab.logs.agreement import Agreement
 
-if TYPE_CHECKING:
-    from rich.table import Table
 
-
-def agreement_table(found: Agreement) -> Table:
-    """Returns a run's agreement with a measured log, two lines for each signal: measured and simulated."""
-    periods = [UNKNOWN if isnan(one) else f"{one:.3f} s" for one in found.period_s]
-    caption = f"lag {found.lag_s:.3f} s, clock drift {100 * found.clock_drift:.2f} %"
-    table = framed_table("signal", "amplitude", "duty", "period", "rms error", "phase", "waveform", caption=caption)
-    table.columns[0].no_wrap = True
+def agreement_table(found: Agreement) -> str:
+    """Returns a run's agreement with a measured log, two lines for each signal: measured, and simulated below it."""
+    rows: list[tuple[str, ...]] = [("signal", "amplitude", "duty", "period", "rms error", "phase", "waveform")]
     for name, one in found.signals.items():
         scale, unit = (1e3, "mm") if one.unit == "m" else (1.0, one.unit)
         share = UNKNOWN if isnan(one.relative) else f"{100 * one.relative:.0f} %"
-        table.add_row(
-            f"{name}\n{one.signal}",
-            "\n".join(f"{scale * size:.3g} {unit}" for size in one.amplitude),
-            "\n".join(f"{100 * high:.0f} %" for high in one.duty),
-            "\n".join(periods),
-            f"{scale * one.rms:.3g} {unit}\n{share}",
-            UNKNOWN if isnan(one.phase) else f"{one.phase:+.2f}",
-            UNKNOWN if isnan(one.waveform) else f"{one.waveform:.2f}",
-        )
-    return table
+        likeness = (f"{each:{form}}" for each, form in ((one.phase, "+.2f"), (one.waveform, ".2f")))
+        errors = (f"{three_digits(scale * one.rms)} {unit}", *(UNKNOWN if "nan" in each else each for each in likeness))
+        both = zip((name, one.signal), one.amplitude, one.duty, found.period_s, (errors, (share,)), strict=True)
+        for label, size, high, period_s, behind in both:
+            period = UNKNOWN if isnan(period_s) else f"{three_digits(period_s)} s"
+            rows.append((label, f"{three_digits(scale * size)} {unit}", f"{100 * high:.0f} %", period, *behind))
+    lag = f"lag {three_digits(found.lag_s)} s, clock drift {100 * found.clock_drift:.2f} %"
+    return f"{aligned(rows)}\n{lag}"
 
 
 def agreement_figure(found: Agreement, stem: Path) -> Path:

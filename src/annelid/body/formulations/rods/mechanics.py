@@ -82,7 +82,7 @@ class RodMechanics(Mechanics):
 
     def edge_strain(self) -> Array:
         """Returns the largest strain of an edge, ``()``."""
-        edge = np.diff(self._vertices.at(self.data.qpos), axis=-1)
+        edge = self._vertices.edges(self.data.qpos)
         squares = edge * edge
         lengths = np.sqrt(squares[0] + squares[1] + squares[2])
         return np.abs(lengths.ravel() * self._edges_per_m - 1.0).max()

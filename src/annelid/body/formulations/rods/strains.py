@@ -127,9 +127,10 @@ class RodVertices:
         self._slide = model.jnt_qposadr[slide].astype(np.intp)
         self._place = model.body_pos[bodies].transpose(2, 0, 1).copy()
 
-    def at(self, qpos: Array) -> Array:
-        """Returns the vertices of a posture, ``(.., nq)``: positions, m, ``(.., 3, n_rods, n_vertices)``."""
-        return self._place + qpos.take(self._slide, axis=-1)
+    def edges(self, qpos: Array) -> Array:
+        """Returns from each vertex of a posture, ``(nq,)``, to the next, m, ``(3, n_rods, n_edges)``."""
+        place = self._place + qpos.take(self._slide)
+        return place[..., 1:] - place[..., :-1]
 
 
 class RodStrains:
@@ -174,7 +175,7 @@ class RodStrains:
 
     def _lie_straight(self, qpos: Array) -> tuple[Array, Array]:
         """Tangents of a posture, and directors that do not twist along the rods."""
-        edge = np.diff(self._vertices.at(qpos), axis=-1)
+        edge = self._vertices.edges(qpos)
         tangent = edge / np.sqrt((edge * edge).sum(axis=0))
         director = np.empty_like(tangent)
         director[..., 0] = _across(tangent[..., 0])
@@ -189,7 +190,7 @@ class RodStrains:
 
     def restore(self, qpos: Array, director: Array) -> None:
         """Lets the rods be in a posture, ``(nq,)``, with the directors that they had in it."""
-        edge = np.diff(self._vertices.at(qpos), axis=-1)
+        edge = self._vertices.edges(qpos)
         self._tangent = edge / np.sqrt((edge * edge).sum(axis=0))
         self.director, self._angle = director.copy(), qpos[self._hinge]
 
@@ -223,9 +224,9 @@ class RodStrains:
         ):
             of_front, of_rear = of_front * per_front, of_rear * per_rear
             row = rows[..., mode, :]
-            row[..., 0:3] = np.moveaxis(-of_front, 0, -1)
-            row[..., 3:6] = np.moveaxis(of_front - of_rear, 0, -1)
-            row[..., 6:9] = np.moveaxis(of_rear, 0, -1)
+            row[..., 0:3] = (-of_front).transpose(1, 2, 0)
+            row[..., 3:6] = (of_front - of_rear).transpose(1, 2, 0)
+            row[..., 6:9] = of_rear.transpose(1, 2, 0)
             row[..., 9], row[..., 10] = hinge_front, hinge_rear
         beyond = (bend - self._bend_at_rest) * direction.conj()
         return np.stack([beyond.real, beyond.imag, twist - self._twist_at_rest], axis=-1)
@@ -251,7 +252,7 @@ class RodStrains:
 
     def _carried(self, qpos: Array) -> tuple[Array, Array, Array]:
         """Tangents and directors in a posture, and lengths of the edges, m, ``(n_rods, n_edges)``."""
-        edge = np.diff(self._vertices.at(qpos), axis=-1)
+        edge = self._vertices.edges(qpos)
         lengths = np.sqrt((edge * edge).sum(axis=0))
         tangent = edge / lengths
         director = _turned(self.director, self._tangent, tangent)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,10 +14,11 @@ import numpy as np
 from annelid.analysis import NUMBERS
 from annelid.config import RunConfig
 from annelid.errors import listed
+from annelid.experiment.case import Case
 from annelid.experiment.finer_runs import STEP, finer_steps, more_elements, run_with_variants
 from annelid.experiment.outcome import Outcome
 from annelid.experiment.progress import StudyProgress
-from annelid.experiment.store import Done
+from annelid.experiment.store import Done, Store
 from annelid.output import write_json
 from annelid.simulation.lock import locks
 from annelid.simulation.runfile import Run, open_run
@@ -85,26 +86,35 @@ class Check:
         return not self.unresolved and not self.differences
 
     def cell(self, name: str) -> str:
-        """Says how far a number moves, for a table; empty where it was not compared."""
+        """Says how far a number moves, with ! if it is not resolved, for a table; empty where it was not compared."""
         if name not in self.moved:
             return ""
-        return percent(self.largest(name)) + ("\nnot resolved" if self.largest(name) > RESOLVED else "")
+        return percent(self.largest(name)) + (" !" if self.largest(name) > RESOLVED else "")
+
+    @property
+    def faults(self) -> list[str]:
+        """What differs and what moves, a clause each; empty where the run is resolved."""
+        faults = [*self.differences]
+        if self.unresolved:
+            named = listed(f"{NUMBERS[name].label} ({percent(self.largest(name))})" for name in self.unresolved)
+            faults.append(f"these numbers move by more than {percent(RESOLVED)}: {named}")
+        return faults
 
     @property
     def sentence(self) -> str:
         """Says in plain words what the check has found."""
         finer = " and ".join(self.finer)
+        only = " Only the step is finer: a planar worm has no elements, a chain keeps its own."
+        left = only if len(self.finer) == 1 else ""
         if self.resolved:
-            return f"Resolved: with {finer} no number moves by more than {percent(RESOLVED)}."
-        faults = [*self.differences]
-        if self.unresolved:
-            named = listed(f"{NUMBERS[name].label} ({percent(self.largest(name))})" for name in self.unresolved)
-            faults.append(f"these numbers move by more than {percent(RESOLVED)}: {named}")
+            return f"Resolved: with {finer} no number moves by more than {percent(RESOLVED)}.{left}"
         # A finer step costs less than a finer mesh, so that it comes first where both help.
         moved = [self.moved[name] for name in self.unresolved]
         helps = [one for one in self.finer if any(by.get(one, 0.0) > RESOLVED for by in moved)]
         field, value = next(iter(self.finer[(helps or [*self.finer])[0]].items()))
-        return f"Not resolved: with {finer} {'; '.join(faults)}. Try --set {field}={value:g}, and check again."
+        return (
+            f"Not resolved: with {finer} {'; '.join(self.faults)}. Try --set {field}={value:g}, and check again.{left}"
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Returns all of it for JSON, where a change is None if only one of the two runs has the number."""
@@ -208,3 +218,22 @@ def check(
     found = compare(itself.outcome, finer, dict(zip(finer, done, strict=True)))
     write_json(folder / f"{RUNS}.json", found.to_dict())
     return open_run(folder), found
+
+
+def check_runs(store: Store, of: Sequence[Case]) -> list[Check]:
+    """Checks runs that a store has, by finer runs that it computes and keeps.
+
+    Args:
+        store: The store.
+        of: The cases of the runs.
+
+    Returns:
+        What the numbers of each run owe to step and mesh.
+
+    Raises:
+        KeyboardInterrupt: Finished runs are kept.
+    """
+    plans = [(case, refinements(case.config)) for case in of]
+    cases = [Case(case.preset, changes, case.config) for case, finer in plans for changes in finer.values()]
+    done = iter(store.finish(cases, "finer runs"))
+    return [compare(store[case], finer, {words: next(done) for words in finer}) for case, finer in plans]

@@ -17,7 +17,7 @@ from annelid.experiment import Case, Store
 from annelid.morphology import Array
 from annelid.simulation import Run
 from annelid_studies.standard_cases import Effort
-from annelid_studies.tables import Results, TerminalTable, grouped, tabulated, terminal_table, write_fields
+from annelid_studies.tables import YES, Results, TerminalTable, grouped, tabulated, terminal_table, write_fields
 
 PRESET = "riddle2025-muscles"
 CM = 100.0
@@ -167,14 +167,13 @@ def study(store: Store, output: Path, effort: Effort) -> Results:
 
 def pipes_table(readings: Sequence[Reading]) -> TerminalTable:
     """Lays out readings for the terminal."""
-    yes = {True: "yes", False: "no", None: "-"}
     columns: Mapping[str, Callable[[Reading], str]] = {
         "pipe": lambda one: f"bend {one.radius_m:g} m" if one.radius_m else one.arena,
         "gait": lambda one: one.gait,
-        "passed": lambda one: yes[one.passed],
+        "passed": lambda one: YES[one.passed],
         "speed (cm/s)": lambda one: f"{CM * one.speed_m_per_s:.2f}",
         "front at (m)": lambda one: f"{one.front_m:.2f}",
-        "in order": lambda one: yes[one.in_order],
+        "in order": lambda one: YES[one.in_order],
         "net work (J/m)": lambda one: "-" if one.work_J_per_m is None else f"{one.work_J_per_m:.0f}",
         "slip ratio": lambda one: "-" if one.slip_ratio is None else f"{one.slip_ratio:.2f}",
     }

@@ -18,6 +18,10 @@ Results = tuple[Sequence[Path], Sequence[TerminalTable]]
 """What a study leaves: the files that it has written, and tables for the terminal."""
 
 
+YES: Mapping[bool | None, str] = {True: "yes", False: "no", None: "-"}
+"""How tables print whether something is so."""
+
+
 def grouped(items: Iterable[T], key: Callable[[T], K]) -> dict[K, list[T]]:
     """Groups things by what a function returns for them, in the order in which they come."""
     found: dict[K, list[T]] = {}

@@ -15,7 +15,7 @@ from annelid.draw import canvas, draw_lines, line_looks, panel_title, save_both
 from annelid.errors import RunFileError
 from annelid.experiment import Case, Store
 from annelid_studies.standard_cases import Effort
-from annelid_studies.tables import Results, TerminalTable, grouped, tabulated, terminal_table, write_fields
+from annelid_studies.tables import YES, Results, TerminalTable, grouped, tabulated, terminal_table, write_fields
 
 COUNTER = (1.0, 1.0, -1.0, -1.0, 1.0, 1.0)
 """Shares of six segments: the ends bend to one side, the middle to the other."""
@@ -171,7 +171,7 @@ def turning_table(readings: Sequence[Reading]) -> TerminalTable:
     columns: Mapping[str, Callable[[Reading], str]] = {
         "gait": lambda one: one.gait,
         "modulation": lambda one: f"{one.modulation:g}",
-        "in order": lambda one: {True: "yes", False: "no", None: "-"}[one.wave],
+        "in order": lambda one: YES[one.wave],
         "cycle (s)": lambda one: f"{one.cycle_s:.2f}",
         "speed (m/s)": lambda one: f"{one.speed_m_per_s:.3f}",
         "turn a cycle (deg)": lambda one: f"{one.turn_deg_per_cycle:.1f}",

@@ -52,7 +52,7 @@ def test_rods_are_refined_in_step_and_mesh_and_others_in_step_alone() -> None:
 def test_a_check_says_that_only_the_step_is_finer(planar: Outcome) -> None:
     for factor in (1.0, 2.0):
         found = compared(planar, Done(of(planar, travel_m=factor)))
-        assert "Only the step is finer: a planar worm has no elements, a chain keeps its own." in found.sentence
+        assert "Only the step is finer: this body has no finer mesh." in found.sentence
 
 
 @settings(max_examples=25)

@@ -78,25 +78,26 @@ def formulation() -> Summary:
     return Summary(**{field: value for field, value in numbers.items() if field in NUMBERS})
 
 
-def references(config: RunConfig) -> dict[str, Published]:
+def references(config: RunConfig, controller: str | None = None) -> dict[str, Published]:
     """Returns what the numbers of a run are compared with, keyed by the fields of `Summary`.
 
     These are the published numbers; for worms of rods that stand for the paper's, also those of the paper's own
-    formulation. A published elongation of a single sensor is compared with the range over all sensors as well.
+    formulation. A published elongation of a single sensor is compared with the range over all sensors as well. The
+    controller is that of the run file, as for `published`.
     """
-    beside = published(config)
+    beside = published(config, controller)
     single = beside.get("elongation_first_helix_pp_m")
     if single is not None:
         beside |= dict.fromkeys(SPREAD, single)
-    if stands_for_the_papers(config):
+    if stands_for_the_papers(config, controller):
         for field in _IN_ITS_RUN:
             beside[field] = Published(_tuple(getattr(formulation(), field)), FORMULATION, f"annelid run {FORMULATION}")
     return beside
 
 
-def stands_for_the_papers(config: RunConfig) -> bool:
+def stands_for_the_papers(config: RunConfig, controller: str | None = None) -> bool:
     """Tells whether a worm is of rods and of the paper's kind, to be compared with the paper's own formulation."""
-    theirs = config.published == FORMULATION and bool(published(config))
+    theirs = config.published == FORMULATION and bool(published(config, controller))
     return theirs and not config.body.is_papers
 
 

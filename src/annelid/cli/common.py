@@ -196,14 +196,18 @@ def config_of(
     return config
 
 
-def _say_unchanged(config: RunConfig, overrides: Mapping[str, Any], source: str, *options: str | None) -> None:
+def _say_unchanged(
+    config: RunConfig, overrides: Mapping[str, Any], source: str, fidelity: str | None, arena: str | None
+) -> None:
     """Says which fields were set to the value that they have without it."""
     from annelid.config import field_value, fields_of, load_config, toml_value, whole_path
 
     if not overrides:
         return
-    fidelity, arena = options
-    without = load_config(source, fidelity=fidelity, arena=arena)
+    try:
+        without = load_config(source, fidelity=fidelity, arena=arena)
+    except ConfigError:
+        return  # Only what is set makes it valid.
     for path in (whole_path(given, config.model_dump()) for given in overrides):
         if path in fields_of(config) and path in fields_of(without):
             value = field_value(config, path)
@@ -313,10 +317,13 @@ def print_run(run: Run, *, everything: bool = False, quiet: bool = False, check:
     checked = {} if check is None else {"check.json": check.to_dict()}
     if give_files([run.path], {run.path.name: numbers.to_dict(), **checked}) or quiet:
         return
-    moved = None if check is None else check.cell
-    lines = [summary_table(numbers, run.config, everything=everything, moved=moved), legend(run.config)]
+    moved, controller = None if check is None else check.cell, run.data.attrs.get("controller")
+    lines = [
+        summary_table(numbers, run.config, controller, everything=everything, moved=moved),
+        legend(run.config, controller),
+    ]
     lines += [f"warning: {doubt}" for doubt in run.warnings]
-    lines += [closing_sentence(numbers, run.config), "" if check is None else check.sentence]
+    lines += [closing_sentence(numbers, run.config, controller), "" if check is None else check.sentence]
     if not everything:
         folder = shlex.quote(str(run.path.parent))
         duration_s = duration_for_a_speed(numbers)

@@ -120,8 +120,8 @@ def _rows(path: Path) -> list[dict[str, Any]]:
 
 def _values(cells: tuple[str, ...]) -> list[Any]:
     """Reads a column: truths or numbers where all cells are, else texts; an empty cell is None."""
-    if all(cell in ("", "True", "False") for cell in cells):
-        return [cell == "True" if cell else None for cell in cells]
+    if all(cell in ("", "True", "False", "true", "false") for cell in cells):
+        return [cell in ("True", "true") if cell else None for cell in cells]
     if all(map(_NUMBER.fullmatch, cells)):
         return [None if not cell else int(cell) if cell.lstrip("-").isdigit() else float(cell) for cell in cells]
     return [cell or None for cell in cells]

@@ -218,7 +218,7 @@ class CallableController:
         """Does nothing: what keeps a state is a class of its own."""
 
     def step(self, sensation: Sensation) -> Array:
-        """Calls the function; whoever steps a controller checks what it gives.
+        """Calls the function; its values are checked where every controller's are.
 
         Raises:
             ConfigError: The activation is no number.

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import MISSING, fields, replace
+from math import isfinite, isnan
 from typing import Any, Literal
 
 from pydantic import Field
@@ -96,6 +97,10 @@ def _built(kind: type[Any], entry: Mapping[str, Any], place: str) -> Any:
             raise ConfigError(f"{place}: {name} = {shown(value)} must be {_WORDS.get(name, 'a number')}")
         if name in _WORDS and isinstance(value, list) and not all(type(one) is _OF[name] for one in value):
             raise ConfigError(f"{place}: {name} = {shown(value)} must be {_WORDS[name]}")
+        if isinstance(value, float) and (isnan(value) or not (isfinite(value) or name in _UNBOUNDED)):
+            raise ConfigError(f"{place}: {name} = {shown(value)} must be a finite number")
+        if name == "place" and (value == [] or min(value if isinstance(value, list) else [value]) < 0):
+            raise ConfigError(f"{place}: {name} = {shown(value)} must be {_WORDS[name]}")
     for name, field in known.items():
         if name not in entry and field.default is MISSING:
             raise ConfigError(f"{place}: {name} is missing")
@@ -107,6 +112,7 @@ def _built(kind: type[Any], entry: Mapping[str, Any], place: str) -> Any:
 
 
 _WANTED: dict[str, Any] = {"quantity": str, "place": (int, list), "contracting": list, "expanding": list}
+_UNBOUNDED = {"least_nA", "most_nA", "until_s"}
 _OF = {"place": int, "contracting": str, "expanding": str}
 _WORDS = {
     "quantity": "a text in quotes",
@@ -119,7 +125,7 @@ _WORDS = {
 class NetworkFile(CircuitKind):
     """A network of your own with its senses and its readout, as ``annelid run --network FILE.toml`` reads it.
 
-    The tolerance of the section `sensor` does not act: the thresholds of the senses are in the text.
+    The tolerance of the section `sensor` acts with an empty text only: else the text has the thresholds.
     """
 
     sensor_fields = frozenset({"noise_m"})

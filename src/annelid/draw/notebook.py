@@ -146,15 +146,19 @@ def _still(run: Run) -> str:
 
 
 def _numbers(run: Run) -> str:
-    numbers = summary(run)
-    beside = legend(run.config)
+    numbers, controller = summary(run), run.data.attrs.get("controller")
+    beside = legend(run.config, controller)
     header = ("quantity", "this run", *(COMPARED if beside else ()))
-    rows = summary_rows(numbers, run.config)
+    rows = summary_rows(numbers, run.config, controller)
     lines = "".join(
         f"<tr>{''.join(f'<td {_LEFT}>{_words(cell)}</td>' for cell in row[: len(header)])}</tr>" for row in rows
     )
     head = "".join(f"<th {_LEFT}>{_words(name)}</th>" for name in header)
-    below = [beside, closing_sentence(numbers, run.config), *(f"warning: {doubt}" for doubt in run.warnings)]
+    below = [
+        beside,
+        closing_sentence(numbers, run.config, controller),
+        *(f"warning: {doubt}" for doubt in run.warnings),
+    ]
     return f"<table><thead><tr>{head}</tr></thead><tbody>{lines}</tbody></table>{''.join(map(_paragraph, below))}"
 
 

@@ -104,8 +104,7 @@ class Check:
     def sentence(self) -> str:
         """Says in plain words what the check has found."""
         finer = " and ".join(self.finer)
-        only = " Only the step is finer: a planar worm has no elements, a chain keeps its own."
-        left = only if len(self.finer) == 1 else ""
+        left = " Only the step is finer: this body has no finer mesh." if len(self.finer) == 1 else ""
         if self.resolved:
             return f"Resolved: with {finer} no number moves by more than {percent(RESOLVED)}.{left}"
         # A finer step costs less than a finer mesh, so that it comes first where both help.
@@ -195,7 +194,7 @@ def check(
     """Runs a worm, and beside it the same worm at half the step and with one more element a side.
 
     Args:
-        config: Any worm; of a planar one or a chain only the step is made finer.
+        config: Any worm; of one without a finer mesh only the step is made finer.
         folder: Folder of the run, ``run.nc``; all runs are kept in ``check`` below it, and a second call goes on.
         executor: Who computes the runs; None for processes of this machine.
         jobs: How many processes, by default one a core.

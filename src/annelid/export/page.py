@@ -59,12 +59,12 @@ def _head(run: Run) -> str:
 
 
 def _numbers(run: Run) -> list[str]:
-    numbers = summary(run)
-    rows = summary_rows(numbers, run.config, everything=True)
-    beside = legend(run.config)
+    numbers, controller = summary(run), run.data.attrs.get("controller")
+    rows = summary_rows(numbers, run.config, controller, everything=True)
+    beside = legend(run.config, controller)
     header = ["quantity", "this run", *(COMPARED if beside else ())]
     cells = [[words(word) for word in row[: len(header)]] for row in rows]
-    below = [beside, closing_sentence(numbers, run.config)]
+    below = [beside, closing_sentence(numbers, run.config, controller)]
     return ["## Numbers", table(header, cells), *(words(text) for text in below if text)]
 
 

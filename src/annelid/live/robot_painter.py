@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from annelid.config import RunConfig
 from annelid.draw.drawn_worm import DrawnRobot
 from annelid.live.history import Moment
-from annelid.live.lines_and_arrows import EARTH_M_PER_S2, Colors, Lines, Picture, ring_colors, spring_colors
+from annelid.live.lines_and_arrows import Colors, Lines, Picture, ring_colors, spring_colors
 from annelid.morphology import Array
 
 _TENDON, _SITE = int(mujoco.mjtTrn.mjTRN_TENDON), int(mujoco.mjtTrn.mjTRN_SITE)
@@ -46,8 +46,8 @@ class RobotPainter:
         self._n_segments = config.body.n_segments
         self._moving = np.flatnonzero(model.body_weldid > 0)
         self.radius_m = float(np.ptp(self._drawn.part_ends(first.qpos), axis=0).max()) / 10
-        weight_N = EARTH_M_PER_S2 * float(model.body_mass[self._moving].sum())
-        self.arrow_N = float(f"{2.0 * weight_N / self._n_segments:.1g}")
+        weight_N = float(model.body_mass[self._moving].sum() * np.linalg.norm(model.opt.gravity))
+        self.arrow_N = float(f"{2.0 * weight_N / self._n_segments:.1g}") if weight_N > 0 else 1.0
 
     def strand_colors(self) -> Colors:
         """Colours of what is not seen: lines without length, to which the camera is fitted."""
@@ -56,7 +56,6 @@ class RobotPainter:
     def paint(self, moment: Moment) -> Picture:
         """Draws one moment."""
         points = self._drawn.part_ends(moment.qpos).astype(np.float32)
-        mujoco.mj_comPos(self.model, self._drawn.posture)
         rings = np.array([self._filled(ends) for ends in self._lines])
         middles = rings.mean(axis=(1, 2)).reshape(self._n_segments, -1, 3).mean(axis=1)
         arrows = np.stack([middles, middles + self.radius_m * moment.contact_force_N / self.arrow_N], axis=1)
@@ -87,7 +86,7 @@ class RobotPainter:
             found = [(_WRAPS[t], int(model.wrap_objid[w])) for w in wraps if (t := int(model.wrap_type[w])) in _WRAPS]
             return [*pairwise(found)] or [(found[0], found[0])]
         if kind == _SITE:
-            return [(("site_xpos", first), ("site_xpos", max(second, first)))]
+            return [(("site_xpos", first), ("site_xpos", second if second >= 0 else first))]
         return [(("xanchor", first), ("xipos", int(model.jnt_bodyid[first])))]
 
     def _filled(self, ends: list[tuple[_End, _End]]) -> Lines:

@@ -146,8 +146,8 @@ def warning_of(host: str) -> str | None:
     if loopback:
         return None
     return (
-        f"--host {host}: other machines reach this view; whoever has its address, token and all, may do what you may, "
-        "and whoever listens on the network in between can read it"
+        f"--host {host}: other machines reach this view. Its whole address with the token lets anybody do what you "
+        "may, and all traffic can be read on the network in between"
     )
 
 

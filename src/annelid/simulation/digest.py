@@ -30,7 +30,7 @@ def room(end: int) -> bytes:
 def write(file: BinaryIO) -> None:
     """Fills the room with the digest of an open file that does not change any more."""
     place = file.seek(-_LENGTH, 2)
-    digest = _sum(file, 0, place)
+    digest = _sum(file, place)
     file.seek(place)
     write_whole(file, digest)
 
@@ -56,12 +56,12 @@ def examine(path: Path, *, compared: bool = True) -> State:
             return "unfinished"
         if not compared:
             return "intact"
-        return "intact" if _sum(file, 0, place) == digest else "damaged"
+        return "intact" if _sum(file, place) == digest else "damaged"
 
 
-def _sum(file: BinaryIO, start: int, stop: int) -> bytes:
-    found = hashlib.sha256()
-    file.seek(start)
+def _sum(file: BinaryIO, stop: int) -> bytes:
+    found, start = hashlib.sha256(), 0
+    file.seek(0)
     while start < stop:
         chunk = file.read(min(_CHUNK, stop - start))
         if not chunk:

@@ -210,7 +210,10 @@ class MjcfPlant(SavedAndRecorded):
             return "ten_length", tendon
         if (sensor := mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SENSOR, name)) >= 0:
             return "sensordata", int(model.sensor_adr[sensor])
-        return "qpos", int(model.jnt_qposadr[model.joint(name).id])
+        joint = model.joint(name).id
+        if mujoco.mjtJoint(model.jnt_type[joint]) not in (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE):
+            raise ConfigError(f"body.sensors: the joint {name!r} is neither a hinge nor a slide, so it has no length")
+        return "qpos", int(model.jnt_qposadr[joint])
 
     def _stretch(self) -> Array:
         return np.array([[float(getattr(self.data, where)[place]) for where, place in row] for row in self._sensors])

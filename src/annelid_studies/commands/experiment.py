@@ -148,12 +148,12 @@ def load_frame_command(
     from annelid.experiment import study_progress
     from annelid_lab import calibration as frame
 
+    if displacement is not None and diameter_share is not None:
+        raise typer.BadParameter("--displacement and --diameter-share say the same: give one of them")
     table = output / "load_frame.csv"
     lock(output)
     refuse_existing(table, force)
     config = config_of(preset, overrides_of(assignments), fidelity=fidelity)
-    if displacement is not None and diameter_share is not None:
-        raise typer.BadParameter("--displacement and --diameter-share say the same: give one of them")
     # A loop of a far larger or smaller ring says nothing of this one.
     has_measured = data is not None or abs(frame.size_of(config) - 1.0) <= 0.2
     measured = {"measured": frame.read_loop(data)} if has_measured else {}

@@ -48,7 +48,7 @@ def test_what_is_no_controller_is_refused_with_its_place(subtests: pytest.Subtes
         (("quantity = ", "quantiti = "), "switch 1: unknown field 'quantiti': did you mean 'quantity'"),
         (("place = 0", "place = 0.5"), "switch 1: place = 0.5 must be a number counted from 0"),
         (("place = 0", "place = -1"), "switch 1: place = -1 must be a number counted from 0"),
-        (("[readout]", "[readout]\nfrom_mV = nan"), "readout: from_mV = nan must be a finite number"),
+        (("from_mV = -20.0", "from_mV = nan"), "readout: from_mV = nan must be a finite number"),
         (('input = "stretch_2"', 'input = "stretch_1"'), "switch 2: input 'stretch_1' is set twice"),
         (('input = "stretch_2"', 'input = "strech_2"'), "no input 'strech_2': did you mean 'stretch_2'"),
         (('scheme = "euler"', 'scheme = "eule"'), "readout: scheme = 'eule': did you mean 'euler'"),

@@ -15,7 +15,6 @@ from enum import Enum
 from typing import ClassVar
 
 BROADCAST = 254
-MOST_SERVOS = 252
 STEPS_PER_TURN = 4096
 WATCHDOG_UNIT_S = 0.02
 SYNC_WRITE = 0x83
@@ -63,6 +62,7 @@ class Protocol2:
         registers: Address and bytes of each register; what a servo has not is left out.
         wheel_mode: What `Register.MODE` is for a servo that turns without end.
         speed_steps_per_s: Steps a second, of which a turn has 4096, in one unit of `Register.SPEED`.
+        most_servos: That one packet can set.
     """
 
     header = b"\xff\xff\xfd\0"
@@ -72,6 +72,7 @@ class Protocol2:
         Register.SPEED: (104, 4), Register.MOST_SPEED: (44, 4), Register.SENSED: (152, 2),
     }  # fmt: skip
     wheel_mode, extended_mode = 1, 4
+    most_servos = 252
     speed_steps_per_s = 0.229 / 60 * STEPS_PER_TURN
 
     def packet(self, servo: int, instruction: int, parameters: bytes = b"") -> bytes:
@@ -127,6 +128,7 @@ class Protocol1(Protocol2):
         Register.SENSED: (36, 2),
     }  # fmt: skip
     wheel_mode = 0
+    most_servos = 50  # the length of a packet is one byte, and a mode has four
     speed_steps_per_s = 0.111 / 60 * STEPS_PER_TURN
     backward = 0x400
 

@@ -67,6 +67,7 @@ class PseudoRobot:
         self._table = {register: np.zeros(n_muscles, dtype=np.int64) for register in Register}
         self._table[Register.GOAL][:] = self.wiring.relaxed
         self._table[Register.MOST_SPEED][:] = MOST_SPEED
+        self._table[Register.MODE][:] = 3  # position control; of protocol 1.0 any limit of the angle
         self._watchdog_ended = np.zeros(n_muscles, dtype=bool)
 
     @property

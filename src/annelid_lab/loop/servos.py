@@ -11,7 +11,6 @@ import numpy as np
 from annelid.errors import ConfigError, SimulationStopped
 from annelid.protocols import Array
 from annelid_lab.loop.dynamixel import (
-    MOST_SERVOS,
     PROTOCOLS,
     STEPS_PER_TURN,
     WATCHDOG_UNIT_S,
@@ -102,8 +101,9 @@ class ServoPlant(PacedPlant):
         Raises:
             ConfigError: More muscles than a bus has addresses.
         """
-        if n_muscles > MOST_SERVOS:
-            raise ConfigError(f"a bus has {MOST_SERVOS} servos at most, not {n_muscles}")
+        most = PROTOCOLS[wiring.protocol].most_servos
+        if n_muscles > most:
+            raise ConfigError(f"a bus of protocol {wiring.protocol} has {most} servos at most, not {n_muscles}")
         super().__init__(Partner("robot", link, pace, watchdog), pace, limits, rest_m, n_muscles, timestep_s)
         self._link, self._wiring, self._bus = link, wiring, PROTOCOLS[wiring.protocol]
         self._decoder = PacketDecoder(self._bus)
@@ -115,6 +115,7 @@ class ServoPlant(PacedPlant):
     def _begin(self) -> None:
         silence = min(max(math.ceil(self.partner.watchdog * self._pace.period_s / WATCHDOG_UNIT_S), 1), 127)
         end = self._pace.clock() + 2.0
+        has_limit = self._wiring.is_wheel and Register.MOST_SPEED in self._bus.registers
         missing: set[int] = set(self._ids)
         while missing and self._pace.clock() < end:
             try:
@@ -126,7 +127,10 @@ class ServoPlant(PacedPlant):
                 self._go(np.zeros(self.n_muscles))
                 self._set(Register.TORQUE, 1)
                 self._set(Register.WATCHDOG, silence)
-                missing = set(self._ids) - self._read(Register.SENSED, 0.2).keys()
+                answers = self._read(Register.MOST_SPEED if has_limit else Register.SENSED, 0.2)
+                missing = set(self._ids) - answers.keys()
+                if has_limit and not missing:
+                    self._most_speed = min(answers.values())
             except OSError as error:
                 raise ConfigError(f"the line to the robot at {self._link.name} is gone: {error}") from None
         if missing:
@@ -137,8 +141,6 @@ class ServoPlant(PacedPlant):
             )
         if not self._is_open:
             self._is_open = True
-            if self._wiring.is_wheel and Register.MOST_SPEED in self._bus.registers:
-                self._most_speed = min(self._read(Register.MOST_SPEED, 0.2).values(), default=0)
             self._check_latency()
 
     def _check_latency(self) -> None:
@@ -203,8 +205,13 @@ class ServoPlant(PacedPlant):
                 register = Register.SPEED if self._wiring.is_wheel else Register.GOAL
                 if self._wiring.is_wheel:
                     self._set(register, 0)
+                    self._speed[:] = 0.0
                 if len(self._read(register, STOP_WAIT_S)) == self.n_muscles:
-                    return None
+                    steps = float(np.abs(self._wound).max())
+                    if steps <= UNWOUND:
+                        return None
+                    turns = steps / STEPS_PER_TURN
+                    return f"wheels at {self._link.name} stopped {turns:.2g} turns from where cables are slack"
             except (OSError, SimulationStopped) as reason:
                 error = f": {reason}"
         return f"the robot at {self._link.name} did not confirm that it stopped{error}"

@@ -137,6 +137,16 @@ def test_servos_of_several_turns_and_wheels_get_there_and_back(wiring: Wiring) -
     assert not plant.doubts()
 
 
+def test_a_winch_that_has_no_time_to_unwind_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("annelid_lab.loop.servos._LONGEST_UNWINDING_S", 0.0)
+    plant = servo_plant(Bus(noise_m=0.0, lag_s=0.05, wiring=Wiring(relaxed=0, contracted=9000, is_wheel=True)))
+    plant.reset(0)
+    for _ in range(150):
+        plant.stride(np.ones((10, 3)))
+    plant.stop()
+    assert "turns from where cables are slack" in plant.doubts()[0]
+
+
 def test_the_latency_timer_of_a_usb_adapter_is_recognised() -> None:
     bus = Bus(latency_s=0.016)
     with pytest.raises(ConfigError, match=r"take 16 ms .* half a period of 10 ms: .*latency timer .* rate to 31 Hz"):

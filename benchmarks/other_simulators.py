@@ -24,7 +24,7 @@ from firmware import WORMS, random_network
 import annelid
 from annelid.nervous import Network
 from annelid.output import write_csv
-from annelid_lab.firmware import controller_network
+from annelid_lab.firmware import controller_circuit
 from annelid_lab.lems import lems_text
 
 PYLEMS = [sys.executable, "-c", "from lems.run import main; main()", "-nogui", "network.xml"], 1
@@ -80,7 +80,7 @@ def groups() -> Iterator[tuple[str, list[Network], float, float]]:
     for name, changes in WORMS.items():
         config = annelid.load_config("riddle2023-rods", changes)
         controller: Any = annelid.build_controller(config, annelid.build_plant(config))
-        yield name, [controller_network(controller)], 0.5, 5000.0
+        yield name, [controller_circuit(controller).network], 0.5, 5000.0
     networks = [random_network(seed) for seed in range(RANDOM)]
     yield "random", networks, 0.05, 200.0
 

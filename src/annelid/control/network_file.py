@@ -21,11 +21,11 @@ from annelid.control.senses import Pulse, Sense, Source, Switch
 from annelid.control.sns import Sns
 from annelid.errors import ConfigError, shown, suggest
 from annelid.nervous import Network
-from annelid.nervous.toml import network_tables
+from annelid.nervous.toml import CIRCUIT_TABLES, network_tables
 from annelid.protocols import Plant
 from annelid.textfiles import parse_toml, toml_text
 
-SOURCES: dict[str, type[Any]] = {"sense": Sense, "switch": Switch, "pulse": Pulse}
+SOURCES: dict[str, type[Any]] = dict(zip(CIRCUIT_TABLES, (Sense, Switch, Pulse), strict=False))
 """What the tables of inputs that are set are called."""
 HOW = "annelid export-network PRESET --to toml writes one"
 

@@ -418,9 +418,10 @@ def results_table(sweep: Sweep) -> Table:
 def _caption(rows: pd.DataFrame) -> str:
     """Says how many runs are complete or doubtful, and why others are not, the most frequent reason first."""
     status: Any = rows["status"]
-    reasons, doubtful = status + ": " + rows["reason"], np.flatnonzero(rows["warnings"] != "").tolist()
+    warnings: Any = rows["warnings"]
+    reasons = status + ": " + rows["reason"]
     lines = [f"{len(rows)} runs, of which {(status == 'complete').sum()} are complete"]
-    if len(doubtful):
+    if doubtful := rows.index[warnings != ""].tolist():
         lines[0] += f", and {len(doubtful)} have warnings (run {_listed(doubtful)}), which {ROWS} has"
     counted = reasons[status != "complete"].value_counts()
     lines += [f"{n} {one} (run {_listed(rows.index[reasons == one])})" for one, n in counted[:N_FAILED].items()]

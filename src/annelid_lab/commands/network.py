@@ -64,12 +64,12 @@ def export_network_command(
     from typing import cast
 
     from annelid.config import preset_names
-    from annelid.control import CircuitController, circuit_text
+    from annelid.control import circuit_text
     from annelid.nervous import Network, Scheme
     from annelid.output import with_suffix, write_text
     from annelid.simulation import build_controller, build_plant
     from annelid.textfiles import read_text, read_toml
-    from annelid_lab.firmware import controller_firmware, controller_network, network_firmware
+    from annelid_lab.firmware import controller_circuit, controller_firmware, network_firmware
     from annelid_lab.lems import lems_text
 
     files = {"c": "firmware", "lems": "network.xml", "toml": "network.toml"}
@@ -94,17 +94,18 @@ def export_network_command(
     if to != "c":
         target = with_suffix(target, (Path(files[to]).suffix,), to, default=Path(files[to]).suffix)
     real = "float" if single else "double"
-    name, worm = "", None
+    name, worm, circuit = "", None, None
     if is_network:
         network = Network.from_toml(read_text(path))
     else:
         config = config_of(source, overrides_of(assignments), segments).model_copy(update={"trial": None})
         name, worm = config.name, build_controller(config, build_plant(config))
-        network = controller_network(worm)
+        circuit = controller_circuit(worm)
+        network = circuit.network
     if to != "c":
         refuse_existing(target, force)
         text = (
-            (circuit_text(worm.circuit) if isinstance(worm, CircuitController) else network.to_toml())
+            (network.to_toml() if circuit is None else circuit_text(circuit))
             if to == "toml"
             else lems_text(network, timestep_ms=0.1 if timestep_ms is None else timestep_ms)
         )

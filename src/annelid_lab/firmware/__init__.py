@@ -1,7 +1,7 @@
 """Controllers and networks as C99, for microcontrollers."""
 
-from annelid_lab.firmware.controllers import controller_firmware, controller_network, network_firmware
+from annelid_lab.firmware.controllers import controller_circuit, controller_firmware, network_firmware
 from annelid_lab.firmware.files import Firmware
 from annelid_lab.firmware.host import HostFirmware
 
-__all__ = ["Firmware", "HostFirmware", "controller_firmware", "controller_network", "network_firmware"]
+__all__ = ["Firmware", "HostFirmware", "controller_circuit", "controller_firmware", "network_firmware"]

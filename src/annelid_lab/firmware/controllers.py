@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from annelid.control import SENSED, CircuitController, TurningController
+from annelid.control import SENSED, Circuit, CircuitController, TurningController
 from annelid.errors import ConfigError, shown
 from annelid.nervous import Network, Scheme
 from annelid.protocols import Controller, Sensation
@@ -94,13 +94,13 @@ def _wire(name: str, interface: Interface) -> tuple[str, ...]:
     return filled("wire.h.txt", words), filled("wire.c.txt", words)
 
 
-def controller_network(controller: Controller) -> Network:
-    """Returns the network of a controller.
+def controller_circuit(controller: Controller) -> Circuit:
+    """Returns the circuit of a controller, turned or not.
 
     Raises:
         ConfigError: The controller steps none.
     """
-    return _circuit_of(controller).circuit.network
+    return _circuit_of(controller).circuit
 
 
 def _circuit_of(controller: Controller) -> CircuitController:

@@ -11,13 +11,19 @@ from annelid_lab.logs.maps import UNIT_AT_END, UNITS, plain_unit
 from annelid_lab.logs.measured import clock_times, point_in, points_of
 from annelid_lab.logs.tables import LogTable, read_table
 
-_SPELT_OUT = {"seconds": "s", "milliseconds": "ms", "meters": "m", "centimeters": "cm", "millimeters": "mm"}
+_SPELT_OUT = {
+    "seconds": "s",
+    "milliseconds": "ms",
+    "millis": "ms",
+    "micros": "us",
+    "meters": "m",
+    "centimeters": "cm",
+    "millimeters": "mm",
+}
 _TIME = re.compile(
     r"t|(?:elapsed|log|run|sim)?[_ ]?times?|zeit|timestamps?|clock|elapsed|date|date.?time|seconds|millis|micros",
     re.IGNORECASE,
 )
-_CLOCKS = {"millis": "ms", "micros": "us", "seconds": "s"}
-"""Names of times that are units, as those of Arduino's functions."""
 _SEGMENT = re.compile(
     r"(?:.*[_ .])?(?:s|seg|segment|spring|stretch|sensor|len|length|l|(pot|adc|analog|a|raw|counts?))[_ ]?(\d+)"
     r"(?:[_ ]?(?:length|len|stretch))?(?:[_ ]?(left|right|l|r|mean|avg))?",
@@ -53,7 +59,7 @@ def proposed_map(path: Path) -> tuple[str, list[str]]:
     if time is not None:
         lines += [f"time = {toml_value(time)}"]
         base, unit, is_stated = _split_unit(time, table)
-        unit = unit or _CLOCKS.get(base.lower())
+        unit = unit or _SPELT_OUT.get(base.lower())
         if unit and not is_stated:
             lines += [f'time_unit = "{unit}"']
         elif not unit and clock_times(time, table) is None:
@@ -113,12 +119,12 @@ def _signals_entries(names: Sequence[str], table: LogTable) -> tuple[list[str], 
         else:
             entries += [f'# {toml_value(name)} = ""   # not recognised']
             continue
-        if unit is None and match and match[1]:
-            entry = f'signal = "{signal}", unit = "1", offset = "free"'
-            entries += [
-                f"{toml_value(name)} = {{ {entry} }}   # scale = 0.0001? metres in a count: the log does not say"
-            ]
-            missing += [f"scale, the metres in a count, of {toml_value(name)}"]
+        counted = "pixel" if unit == "px" else "count" if unit is None and match and match[1] else None
+        if counted:
+            own = "" if unit else ', unit = "1", offset = "free"'
+            remark = f"scale = 0.0001? metres in a {counted}: the log does not say"
+            entries += [f'{toml_value(name)} = {{ signal = "{signal}"{own} }}   # {remark}']
+            missing += [f"scale, the metres in a {counted}, of {toml_value(name)}"]
         elif unit is None:
             entries += [f'{toml_value(name)} = {{ signal = "{signal}" }}   # unit = "mm"? the log does not say']
             missing += [f"the unit of {toml_value(name)}"]

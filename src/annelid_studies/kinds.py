@@ -6,5 +6,6 @@ from annelid_studies import oscillators as oscillators
 from annelid_studies import planar as planar
 from annelid_studies import pressure as pressure
 from annelid_studies import waiting as waiting
+from annelid_studies.challenge import controllers as controllers
 
 add_presets("annelid_studies")

@@ -335,5 +335,5 @@ def test_a_scene_is_the_arena_of_a_robot() -> None:
 def test_the_section_has_its_own_ground() -> None:
     with pytest.raises(ConfigError, match=r"arena\.kind = 'floor' cannot be beside .*: --arena takes a scene"):
         robot(changes={"arena.kind": "floor"})
-    with pytest.raises(ConfigError, match=r"trial.push_N = 1: body.kind = 'mjcf' cannot be pushed"):
-        robot(changes={"trial.push_N": 1.0})
+    with pytest.raises(ConfigError, match=r"trial.pull = 0.1: body.kind = 'mjcf' cannot be pulled"):
+        robot(changes={"trial.pull": 0.1})

@@ -69,7 +69,7 @@ def test_values_changed_live_are_values_built_in(arena: str | None, change: dict
 
 
 def test_a_worm_under_trial_goes_on_from_where_it_is() -> None:
-    trial = {"drift_m_per_s": 1e-3, "loss": 0.3, "delay_s": 0.05, "backlash": 0.2}
+    trial = {"loss": 0.3, "weak_strength": 0.5}
     before = load_config("riddle2023-rods", {"trial": trial, "seed": 3})
     after = load_config("riddle2023-rods", {"trial": trial | {"loss": 0.6}, "seed": 3, "sensor.tolerance_m": 0.03})
     simulation = running(before)

@@ -81,6 +81,8 @@ POSTS = {**RODS, "arena": {"kind": "floor", "posts": [[1.0, 2.0, 0.1]]}}
         (POSTS, 5, {"body.formulation.solver_tolerance": None}, None),
         (ROBUST, 6, {"controller.push_nA": 6.0, "controller.let_go_s": 0.2}, None),
         (ROBUST, 6, {"controller.entrainment": 0.0}, "controller.entrainment was 0.0"),
+        (BLIND, 6, {"trial.loss_s": 0.2, "trial.push_s": 0.5, "trial.delay_s": 0.0}, None),
+        (BLIND, 6, {"trial.delay_s": 0.1}, "trial.delay_s was 0.1"),
         (BLIND, 6, {"trial.loss_s": 0.2, "body.heading_deg": 0.0}, None),
         (RODS, 6, {"body.heading_deg": 90.0}, "its travel is told along -x"),
         (ROUGH, 5, {"arena.posts": [[1.0, 2.0, 0.1]]}, "arena.posts was"),

@@ -13,10 +13,11 @@ MINE = "[mine]\ncontroller = {kind = 'sine'}\ntuned_on = [0, 1001]\n"
     ("arguments", "says"),
     [
         (("nobody",), "unknown entrant 'nobody'"),
-        (("mine.toml",), "tuned_on has test seeds (all tasks: 1001): tune on seeds below 1000"),
+        (("mine.toml",), "tuned_on has test seeds (1001): tune on seeds below 1000"),
         (("none:Controller",), "none cannot be imported"),
         (("--task", "slop"), "unknown task 'slop': did you mean 'slope'?"),
-        (("--against", "none.csv"), "none.csv is no runs.csv"),
+        (("--body", "seven"), "unknown body 'seven'"),
+        (("sns", "--tune", "2"), "says in `vary` what is searched"),
         (("--with", "none.csv"), "none.csv is no runs.csv"),
     ],
 )
@@ -36,7 +37,7 @@ def test_two_quick_rankings_are_identical(annelid: Command) -> None:
         done = annelid("study", "challenge", "--quick", "-o", folder)
         assert done.exit_code == 0, done.err
         assert "speed" in done.out
-    names = ("runs.csv", "scores.csv", "tasks.csv", "challenge.png", "challenge.svg")
+    names = ("runs.csv", "scores.csv", "pairs.csv", "challenge.png", "challenge.svg")
     assert done.out.splitlines()[-4:] == [str(Path("two", name)) for name in names[:4]]
     for name in names:
         assert Path("one", name).read_bytes() == Path("two", name).read_bytes()

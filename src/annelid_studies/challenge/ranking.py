@@ -1,219 +1,220 @@
-"""From scores to a ranking: means with bootstrap intervals, differences to the reference, shares, and stability."""
+"""From scores to a ranking: means, paired differences and ranks, with intervals by bootstrap over draws and tasks."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import nan
-from typing import Any
+from itertools import combinations
+from math import inf, nan, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import binomtest, bootstrap, kendalltau
+from scipy.stats import binomtest, rankdata, studentized_range
 
 from annelid_studies.challenge.scores import Score
 from annelid_studies.challenge.tasks import REFERENCE
 from annelid_studies.tables import grouped
 
 ALL = "all"
-"""What stands for a task in the ranking over all of them."""
+"""What stands for a body or a task in the ranking over all of them."""
 TRAVELS, LEAST_M_PER_S = 0.1, 0.001
 """A run travels above this share of the reference's mean speed on the task, and above this speed."""
 LEAST_REFERENCE_M_PER_S = 0.005
 """A ratio is to the reference's mean speed, but to no less than this."""
-PERIOD_TOLERANCE = 0.1
-"""A run is in time if it is in order with a period this near to the median of its entrant's, for its segments."""
 RESAMPLES = 2000
 Array = NDArray[np.float64]
-COLUMNS = (
-    "speed",
-    "gain",
-    "ratio",
-    "robust",
-    "in_order",
-    "in_time",
-    "travels",
-    "refused",
-    "slip",
-    "work",
-    "electric",
-    "distance",
-    "recovery",
-)
-"""What is kept of every run for the means."""
 
 
 @dataclass(frozen=True, slots=True)
 class Standing:
     """How an entrant did on a task, or on all of them.
 
-    Intervals are of 95 %, of shares after Wilson, else by bootstrap over draws; NaN where there is nothing to tell. A
-    gain is the mean difference to the reference on the same draws, a ratio the mean speed over the reference's; over
-    all tasks both are means of the tasks'. Energies are sums over runs that were not refused, over their whole way.
+    Intervals are of 95 %, of shares after Wilson, else by bootstrap over tasks and draws; NaN where there is nothing to
+    tell. A ratio is the speed over the reference's mean on the same body and task, to 5 mm/s where that is slower.
+    Energies are sums over runs that were not refused, over their whole way.
     """
 
     entrant: str
+    body: str  # `ALL` for all
     task: str  # `ALL` for all
     draws: int  # Of every task
     speed_m_per_s: float
     speed_low: float
     speed_high: float
-    worst_m_per_s: float  # Slowest run
-    gain_m_per_s: float
-    gain_low: float
-    gain_high: float
     ratio: float
     ratio_low: float
     ratio_high: float
     robust: float  # Share of runs that travel in order
     robust_low: float
     robust_high: float
-    in_order: float  # Share in order
-    in_time: float  # Share in time
-    in_time_low: float
-    in_time_high: float
-    travels: float  # Share that travels
-    travels_low: float
-    travels_high: float
     refused: float  # Share that was refused
-    recovery_s: float  # Mean of the runs that recovered
     slip_J_per_m: float
     work_J_per_m: float
     electric_J_per_m: float
-    electric_low: float
-    electric_high: float
 
 
-def interval(values: Array, statistic: Callable[[Array], Array]) -> tuple[float, float, float]:
-    """Returns a statistic, and its 95 % bootstrap interval over draws (percentiles); NaN for a single draw.
+@dataclass(frozen=True, slots=True)
+class Pair:
+    """Two entrants on the same draws.
 
-    Draws of one task have nothing to do with those of another, so each task's are drawn anew by themselves.
-
-    Args:
-        values: Numbers of every draw, ``(n_draws, n_tasks, n_columns)``.
-        statistic: From means over draws, ``(.., n_tasks, n_columns)``, to numbers, ``(..)``.
+    Attributes:
+        first: The one.
+        second: The other.
+        body: `ALL` for all.
+        difference: Mean ratio of the first less that of the second, with its 95 % interval by bootstrap.
+        difference_low: Lower end.
+        difference_high: Upper end.
+        faster: Share of tasks and draws in which the first is faster, half of those in which both are alike.
+        faster_low: Lower end of its interval.
+        faster_high: Upper end.
+        at_half_step: The difference at half the step, on the draws that were run there; NaN if none were.
+        at_step: The difference at the tasks' step on the same draws.
     """
 
-    def of_draws(*of_tasks: NDArray[np.int64], axis: int = -1) -> Array:
-        means = [values[index, task].mean(axis=-2) for task, index in enumerate(of_tasks)]
-        return statistic(np.stack(means, axis=-2))
+    first: str
+    second: str
+    body: str
+    difference: float
+    difference_low: float
+    difference_high: float
+    faster: float
+    faster_low: float
+    faster_high: float
+    at_half_step: float
+    at_step: float
 
-    n_draws, n_tasks = values.shape[:2]
-    draws = (np.arange(n_draws),) * n_tasks
+
+class Speeds:
+    """Speeds of entrants over cells, each a task on a body, and draws.
+
+    Attributes:
+        entrants: Their names.
+        cells: Body and task of every cell.
+        speed_m_per_s: ``(n_entrants, n_cells, n_draws)``.
+        ratio: The same over the reference's mean of the cell.
+    """
+
+    def __init__(self, scores: Sequence[Score]) -> None:
+        """Arranges scores; every entrant must have run every cell with the same draws, the reference among them."""
+        of = {(one.entrant, (one.body, one.task), one.seed): one.speed_m_per_s for one in scores}
+        self.entrants = list(dict.fromkeys(name for name, _, _ in of))
+        self.cells = list(dict.fromkeys(cell for _, cell, _ in of))
+        seeds = list(dict.fromkeys(seed for _, _, seed in of))
+        self.speed_m_per_s: Array = np.array(
+            [[[of[name, cell, seed] for seed in seeds] for cell in self.cells] for name in self.entrants]
+        )
+        mean = self.speed_m_per_s[self.entrants.index(REFERENCE)].mean(axis=-1)
+        self.ratio: Array = self.speed_m_per_s / np.maximum(mean, LEAST_REFERENCE_M_PER_S)[:, np.newaxis]
+
+
+def _interval(values: Array) -> tuple[float, float, float]:
+    """Returns the mean over cells and draws, ``(n_cells, n_draws)``, and its interval by bootstrap (percentiles)."""
+    n_cells, n_draws = values.shape
     if n_draws < 2:
-        return float(of_draws(*draws)), nan, nan
-    # It computes a standard error as well, which an infinite number does not have.
-    with np.errstate(invalid="ignore"):
-        found = bootstrap(draws, of_draws, n_resamples=RESAMPLES, method="percentile", rng=0).confidence_interval
-    return float(of_draws(*draws)), float(found.low), float(found.high)
-
-
-def _mean(column: str) -> Callable[[Array], Array]:
-    """The mean of a column over tasks."""
-    return lambda means: means[..., COLUMNS.index(column)].mean(axis=-1)
-
-
-def _share(which: Array) -> tuple[float, float, float]:
-    """A share of runs with its 95 % interval after Wilson 1927, which is no point where all runs agree."""
-    found = binomtest(int(which.sum()), which.size).proportion_ci(method="wilson")
-    return float(which.mean()), float(found.low), float(found.high)
-
-
-def _per_metre(column: str) -> Callable[[Array], Array]:
-    """The sum of a column over the sum of distances; infinite for a worm that gets nowhere."""
-
-    def over(means: Array) -> Array:
-        energy, way = (means[..., COLUMNS.index(name)].sum(axis=-1) for name in (column, "distance"))
-        return np.where(way > 0.0, energy / np.where(way > 0.0, way, 1.0), np.inf)
-
-    return over
+        return float(values.mean()), nan, nan
+    rng = np.random.default_rng(0)
+    cells = rng.integers(n_cells, size=(RESAMPLES, n_cells))[..., np.newaxis]
+    means = values[cells, rng.integers(n_draws, size=(RESAMPLES, n_cells, n_draws))].mean(axis=(1, 2))
+    low, high = np.percentile(means, (2.5, 97.5)).tolist()
+    return float(values.mean()), low, high
 
 
 def standings(scores: Sequence[Score]) -> list[Standing]:
-    """Ranks entrants: those over all tasks first, the fastest first, then those of each task.
+    """Ranks entrants at the tasks' step: over all tasks, then those of each body, then of each task on each body.
 
-    Every entrant must have run every task with the same draws, the reference among them.
+    Each group begins with the entrant that is fastest over all.
     """
-    by_task = grouped(scores, lambda one: one.task)
-    of: dict[str, list[Array]] = {}
-    periods = grouped((one for one in scores if one.in_order), lambda one: (one.entrant, one.segments))
-    own_period_s = {key: float(np.median([one.period_s for one in own])) for key, own in periods.items()}
-    for own in by_task.values():
-        by_entrant = grouped(sorted(own, key=lambda one: one.seed), lambda one: one.entrant)
-        reference = np.array([one.speed_m_per_s for one in by_entrant[REFERENCE]])
-        for name, each in by_entrant.items():
-            of.setdefault(name, []).append(_values(each, reference, own_period_s))
-    overall = [_standing(name, ALL, np.stack(values, axis=1)) for name, values in of.items()]
-    overall.sort(key=lambda one: -one.ratio)
-    best = [one.entrant for one in overall]
-    return overall + [
-        _standing(name, task, of[name][i][:, np.newaxis]) for i, task in enumerate(by_task) for name in best
-    ]
+    at_step = [one for one in scores if one.finer == 1]
+    speeds = Speeds(at_step)
+    best = np.argsort(-speeds.ratio.mean(axis=(1, 2)), kind="stable").tolist()
+    groups: list[tuple[str, str]] = [(ALL, ALL), *((body, ALL) for body in dict.fromkeys(b for b, _ in speeds.cells))]
+    runs = grouped(at_step, lambda one: one.entrant)
+    found = []
+    for body, task in [*groups, *speeds.cells]:
+        cells = [i for i, cell in enumerate(speeds.cells) if body in (ALL, cell[0]) and task in (ALL, cell[1])]
+        for i in best:
+            name = speeds.entrants[i]
+            own = [one for one in runs[name] if body in (ALL, one.body) and task in (ALL, one.task)]
+            numbers = (
+                *_interval(speeds.speed_m_per_s[i, cells]),
+                *_interval(speeds.ratio[i, cells]),
+                *_share([one.in_order and _travels(one, speeds) for one in own]),
+                float(np.mean([bool(one.refused) for one in own])),
+                *(_per_metre(own, energy) for energy in ("slip_J", "work_J", "electric_J")),
+            )
+            draws = speeds.ratio.shape[-1]
+            found.append(Standing(name, body, task, draws, *(float(f"{number:.5g}") for number in numbers)))
+    return found
 
 
-def _values(scores: Sequence[Score], reference_m_per_s: Array, own_period_s: Mapping[tuple[str, int], float]) -> Array:
-    """The columns of one entrant's runs at a task, ``(n_draws, n_columns)``."""
-    mean = float(reference_m_per_s.mean())
-    rows = []
-    for one, beside in zip(scores, reference_m_per_s.tolist(), strict=True):
-        speed = one.speed_m_per_s
-        travels = speed > max(TRAVELS * mean, LEAST_M_PER_S)
-        of_own = one.period_s / own_period_s[one.entrant, one.segments] if one.in_order else nan
-        in_time = abs(of_own - 1.0) <= PERIOD_TOLERANCE
-        shares = travels and one.in_order, one.in_order, in_time, travels, bool(one.refused)
-        spent = (0.0,) * 3 if one.refused else (one.slip_J, one.work_J, one.electric_J)
-        rows.append(
-            [
-                speed,
-                speed - beside,
-                speed / max(mean, LEAST_REFERENCE_M_PER_S),
-                *shares,
-                *spent,
-                one.distance_m,
-                one.recovery_s,
-            ]
+def _travels(score: Score, speeds: Speeds) -> bool:
+    cell = speeds.cells.index((score.body, score.task))
+    reference = float(speeds.speed_m_per_s[speeds.entrants.index(REFERENCE), cell].mean())
+    return score.speed_m_per_s > max(TRAVELS * reference, LEAST_M_PER_S)
+
+
+def _share(which: Sequence[bool]) -> tuple[float, float, float]:
+    """A share of runs with its 95 % interval after Wilson 1927, which is no point where all runs agree."""
+    found = binomtest(sum(which), len(which)).proportion_ci(method="wilson")
+    return float(np.mean(which)), float(found.low), float(found.high)
+
+
+def _per_metre(scores: Sequence[Score], energy: str) -> float:
+    """The sum of an energy over the sum of ways; infinite for a worm that gets nowhere."""
+    count = [one for one in scores if not one.refused]
+    way = sum(one.distance_m for one in count)
+    return sum(getattr(one, energy) for one in count) / way if way > 0.0 else inf
+
+
+def pairs(scores: Sequence[Score]) -> list[Pair]:
+    """Compares every two entrants on the same draws, over all tasks and on each body."""
+    speeds = Speeds([one for one in scores if one.finer == 1])
+    finer = {(one.entrant, one.body, one.task, one.seed) for one in scores if one.finer != 1}
+    both = [one for one in scores if (one.entrant, one.body, one.task, one.seed) in finer]
+    coarse, fine = ([one for one in both if (one.finer == 1) == at_step] for at_step in (True, False))
+    beside = (Speeds(coarse), Speeds(fine)) if finer else None
+    found = []
+    for body in (ALL, *dict.fromkeys(body for body, _ in speeds.cells)):
+        cells = [i for i, cell in enumerate(speeds.cells) if body in (ALL, cell[0])]
+        for first, second in combinations(speeds.entrants, 2):
+            one, other = (speeds.ratio[speeds.entrants.index(name)][cells] for name in (first, second))
+            numbers = (*_interval(one - other), *_interval((one > other) + 0.5 * (one == other)))
+            steps = (nan, nan) if beside is None else [_difference(each, first, second, body) for each in beside[::-1]]
+            found.append(Pair(first, second, body, *(float(f"{number:.4g}") for number in (*numbers, *steps))))
+    return found
+
+
+def _difference(speeds: Speeds, first: str, second: str, body: str) -> float:
+    cells = [i for i, cell in enumerate(speeds.cells) if body in (ALL, cell[0])]
+    one, other = (speeds.ratio[speeds.entrants.index(name)][cells] for name in (first, second))
+    return float((one - other).mean())
+
+
+def half_step_changes(scores: Sequence[Score]) -> dict[str, Array]:
+    """Returns how much an entrant's mean speed changes at half the step, relative, of every cell that was run there.
+
+    Cells in which it is slower than 5 mm/s at both steps are left out.
+    """
+    by = grouped(scores, lambda one: (one.entrant, one.body, one.task, one.seed))
+    twice = [own for own in by.values() if len({one.finer for one in own}) > 1]
+    cells = grouped(twice, lambda own: (own[0].entrant, own[0].body, own[0].task))
+    found: dict[str, list[float]] = {}
+    for (entrant, _, _), draws in cells.items():
+        coarse, fine = (
+            float(np.mean([one.speed_m_per_s for own in draws for one in own if (one.finer == 1) == at_step]))
+            for at_step in (True, False)
         )
-    return np.array(rows, dtype=float)
+        if max(coarse, fine) >= LEAST_REFERENCE_M_PER_S:
+            found.setdefault(entrant, []).append(fine / coarse - 1.0 if coarse else inf)
+    return {name: np.array(changes) for name, changes in found.items()}
 
 
-def _standing(name: str, task: str, values: Array) -> Standing:
-    means, recovery = values.mean(axis=0), values[..., COLUMNS.index("recovery")]
-    numbers = (
-        *interval(values, _mean("speed")),
-        float(values[..., COLUMNS.index("speed")].min()),
-        *interval(values, _mean("gain")),
-        *interval(values, _mean("ratio")),
-        *_share(values[..., COLUMNS.index("robust")]),
-        float(_mean("in_order")(means)),
-        *_share(values[..., COLUMNS.index("in_time")]),
-        *_share(values[..., COLUMNS.index("travels")]),
-        float(_mean("refused")(means)),
-        float(np.nanmean(recovery)) if np.isfinite(recovery).any() else nan,
-        *(float(_per_metre(column)(means)) for column in ("slip", "work")),
-        *interval(values, _per_metre("electric")),
-    )
-    return Standing(name, task, len(values), *(float(f"{number:.5g}") for number in numbers))
+def mean_ranks(speeds: Speeds) -> tuple[Mapping[str, float], float]:
+    """Returns the mean rank of every entrant over cells, 1 the fastest, and the critical difference of Nemenyi.
 
-
-def agreement(one: Mapping[tuple[str, str], float], other: Mapping[tuple[str, str], float]) -> dict[str, float]:
-    """Compares two rankings by task: Kendall's tau of the mean speeds of the entrants that are in both.
-
-    Args:
-        one: Mean speeds by entrant and task, from `mean_speeds`.
-        other: Likewise.
-
-    Returns:
-        Tau by every task of the first; NaN where fewer than two of its entrants are in both and differ.
+    Two mean ranks that differ by less are not told apart at 5 % (Demsar 2006, equation for the Nemenyi test).
     """
-    taus: dict[str, float] = {}
-    for task, own in grouped(one, lambda key: key[1]).items():
-        keys = [key for key in own if key in other]
-        found: Any = kendalltau([one[key] for key in keys], [other[key] for key in keys])
-        taus[task] = float(found.statistic)
-    return taus
-
-
-def mean_speeds(scores: Sequence[Score]) -> dict[tuple[str, str], float]:
-    """Returns mean speeds by entrant and task, m/s."""
-    by_pair = grouped(scores, lambda one: (one.entrant, one.task))
-    return {pair: float(np.mean([one.speed_m_per_s for one in own])) for pair, own in by_pair.items()}
+    ranks = rankdata(-speeds.speed_m_per_s.mean(axis=-1), axis=0).mean(axis=1)
+    k, n = len(speeds.entrants), len(speeds.cells)
+    critical = float(studentized_range.ppf(0.95, k, inf)) / sqrt(2.0) * sqrt(k * (k + 1) / (6.0 * n)) if k > 1 else nan
+    return dict(zip(speeds.entrants, ranks.tolist(), strict=True)), critical

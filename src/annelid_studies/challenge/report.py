@@ -4,123 +4,112 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import astuple
-from itertools import cycle
 from math import isfinite
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.ticker import LogFormatter
 from rich.table import Table as TerminalTable
 
 from annelid.draw import canvas, panel_title, save_both, segment_colors
 from annelid.markdown import Table
 from annelid.output import write_csv
-from annelid_studies.challenge.ranking import ALL, Standing
-from annelid_studies.challenge.tasks import REFERENCE
+from annelid_studies.challenge.ranking import ALL, Array, Pair, Speeds, Standing, mean_ranks
+from annelid_studies.challenge.scores import Score
 from annelid_studies.tables import grouped, tabulated, terminal_table
 
 CM = 100.0
 
 
 def write_rows(kind: type[Any], rows: Sequence[Any], path: Path) -> Path:
-    """Writes scores or standings as CSV, a column for every field; what there is nothing to tell of stays empty."""
+    """Writes scores, standings or pairs as CSV, a column for every field; NaN stays empty."""
     return write_csv(path, kind.__slots__, ([_cell(value) for value in astuple(row)] for row in rows))
-
-
-def _with_interval(number: float, low: float, high: float, digits: int = 2) -> str:
-    if not isfinite(number):
-        return "-"
-    return f"{number:.{digits}f}" + (f" ({low:.{digits}f} .. {high:.{digits}f})" if isfinite(low) else "")
-
-
-def ranking_table(found: Sequence[Standing]) -> TerminalTable:
-    """Lays out the ranking over all tasks."""
-    columns: Mapping[str, Callable[[Standing], str]] = {
-        "entrant": lambda one: one.entrant,
-        "speed over reference": lambda one: _with_interval(one.ratio, one.ratio_low, one.ratio_high),
-        "travels in order": lambda one: _with_interval(one.robust, one.robust_low, one.robust_high),
-        "in time": lambda one: _with_interval(one.in_time, one.in_time_low, one.in_time_high),
-        "travels": lambda one: _with_interval(one.travels, one.travels_low, one.travels_high),
-    }
-    overall = [one for one in found if one.task == ALL]
-    return terminal_table(tabulated(overall, columns), "All tasks", caption="with 95 % intervals over draws")
-
-
-def speed_table(found: Sequence[Standing], taus: Sequence[Mapping[str, float]] = ()) -> TerminalTable:
-    """Lays out mean speeds, a row a task and a column an entrant, and Kendall's tau of comparisons that were made."""
-    overall = [one.entrant for one in found if one.task == ALL]
-    rows = []
-    for task, own in _by_task(found).items():
-        of = {one.entrant: one for one in own}
-        speeds = (f"{CM * of[name].speed_m_per_s:.2f}{'*' if differs(of[name]) else ''}" for name in overall)
-        rows.append([task, *speeds, *(f"{tau[task]:.2f}" for tau in taus)])
-    caption = "* the 95 % interval of the difference to the reference excludes zero"
-    heads = ["task", *overall, *(f"tau {i}" for i in range(1, len(taus) + 1))]
-    return terminal_table(Table(heads, rows), "Mean speed (cm/s)", caption=caption)
-
-
-def differs(one: Standing) -> bool:
-    """Whether the interval of the difference to the reference excludes zero."""
-    return one.gain_low > 0.0 or one.gain_high < 0.0
-
-
-def write_tasks(found: Sequence[Standing], taus: Sequence[Mapping[str, float]], path: Path) -> Path:
-    """Writes a row a task as CSV: the reference, the fastest other entrant beside it, and every entrant's mean speed.
-
-    Args:
-        found: Standings.
-        taus: Kendall's tau by task, from comparisons with other rankings; a column each.
-        path: File to write.
-    """
-    entrants = [one.entrant for one in found if one.task == ALL]
-    rows = []
-    for task, own in _by_task(found).items():
-        of = {one.entrant: one for one in own}
-        baseline = of[REFERENCE]
-        best = max((one for one in own if one is not baseline), key=lambda one: one.speed_m_per_s, default=baseline)
-        numbers = [baseline.speed_m_per_s, baseline.speed_low, baseline.speed_high, best.entrant, best.speed_m_per_s]
-        numbers += [best.gain_m_per_s, best.gain_low, best.gain_high]
-        rows.append([task, *numbers, *(tau[task] for tau in taus), *(of[name].speed_m_per_s for name in entrants)])
-    baseline_columns = ["reference_m_per_s", "reference_low", "reference_high"]
-    best_columns = ["best", "best_m_per_s", "gain_m_per_s", "gain_low", "gain_high"]
-    columns = ["task", *baseline_columns, *best_columns, *(f"tau_{i}" for i in range(1, len(taus) + 1)), *entrants]
-    return write_csv(path, columns, ([_cell(value) for value in row] for row in rows))
-
-
-def _by_task(found: Sequence[Standing]) -> dict[str, list[Standing]]:
-    return grouped((one for one in found if one.task != ALL), lambda one: one.task)
 
 
 def _cell(value: object) -> object:
     return None if isinstance(value, float) and not isfinite(value) else value
 
 
-def ranking_figure(found: Sequence[Standing], stem: Path) -> Path:
-    """Draws speed against what the motors take per metre, and against the share of runs that travel in order."""
-    overall = [one for one in found if one.task == ALL]
-    with canvas(3.6) as figure:
-        energy, robust = figure.subplots(1, 2, sharey=True)
-        looks = zip(overall, segment_colors(len(overall)), cycle((-10, 3)), strict=False)
-        for one, color, above in looks:
-            y = (one.ratio, one.ratio_low, one.ratio_high)
-            _point(energy, one.entrant, (one.electric_J_per_m, one.electric_low, one.electric_high), y, color, above)
-            _point(robust, one.entrant, (one.robust, one.robust_low, one.robust_high), y, color, above)
-        panel_title(energy, "Speed against energy")
-        energy.set(xlabel="electrical energy (J/m)", ylabel="speed over the reference's, mean of tasks", xscale="log")
-        for show in (energy.xaxis.set_major_formatter, energy.xaxis.set_minor_formatter):
-            show(LogFormatter(minor_thresholds=(2, 1)))
-        panel_title(robust, "Speed against robustness")
-        robust.set(xlabel="share of runs that travel in order", xlim=(-0.05, 1.05))
+def _with_interval(number: float, low: float, high: float) -> str:
+    if not isfinite(number):
+        return "-"
+    return f"{number:.2f}" + (f" ({low:.2f} .. {high:.2f})" if isfinite(low) else "")
+
+
+def _median(changes: Array | None) -> str:
+    return "-" if changes is None else f"{np.median(np.abs(changes)):.1%}"
+
+
+def ranking_table(found: Sequence[Standing], changes: Mapping[str, Array]) -> TerminalTable:
+    """Lays out the ranking over all bodies and tasks."""
+    columns: Mapping[str, Callable[[Standing], str]] = {
+        "entrant": lambda one: one.entrant,
+        "speed over the reference's": lambda one: _with_interval(one.ratio, one.ratio_low, one.ratio_high),
+        "travels in order": lambda one: _with_interval(one.robust, one.robust_low, one.robust_high),
+        "refused": lambda one: f"{one.refused:.0%}",
+        "slip (J/m)": lambda one: f"{one.slip_J_per_m:.3g}",
+        "work (J/m)": lambda one: f"{one.work_J_per_m:.3g}",
+        "half the step": lambda one: _median(changes.get(one.entrant)),
+    }
+    overall = [one for one in found if one.task == one.body == ALL]
+    caption = "with 95 % intervals over tasks and draws; half the step: median change of speed there"
+    return terminal_table(tabulated(overall, columns), "All bodies and tasks", caption=caption)
+
+
+def speed_table(found: Sequence[Standing]) -> TerminalTable:
+    """Lays out mean speeds, a row for a task on a body and a column an entrant."""
+    names = [one.entrant for one in found if one.task == one.body == ALL]
+    cells = grouped((one for one in found if one.task != ALL), lambda one: (one.body, one.task))
+    rows = [[body, task, *(f"{CM * one.speed_m_per_s:.2f}" for one in own)] for (body, task), own in cells.items()]
+    return terminal_table(Table(["body", "task", *names], rows), "Mean speed (cm/s)", n_words=2)
+
+
+def refused_table(scores: Sequence[Score]) -> TerminalTable:
+    """Lays out the runs that were refused and count as speed 0, by entrant and reason."""
+    lost = grouped((one for one in scores if one.refused), lambda one: (one.entrant, one.body, one.task))
+    rows = [[*key, str(len(own)), own[0].refused] for key, own in lost.items()]
+    return terminal_table(Table(["entrant", "body", "task", "runs", "reason"], rows), "Refused runs", n_words=5)
+
+
+def ranking_figure(found: Sequence[Standing], speeds: Speeds, stem: Path) -> Path:
+    """Draws speeds with their intervals over each body, and mean ranks with the critical difference."""
+    names = [one.entrant for one in found if one.task == one.body == ALL]
+    of = {(one.entrant, one.body): one for one in found if one.task == ALL}
+    bodies = list(dict.fromkeys(body for body, _ in speeds.cells))
+    ranks, critical = mean_ranks(speeds)
+    heights = np.arange(len(names))[::-1]
+    with canvas(0.9 + 0.28 * len(names)) as figure:
+        ratio, rank = figure.subplots(1, 2, sharey=True)
+        for i, (body, color) in enumerate(zip(bodies, segment_colors(len(bodies)), strict=True)):
+            own = [of[name, body] for name in names]
+            values = np.array([one.ratio for one in own])
+            spans = np.array([[one.ratio - one.ratio_low, one.ratio_high - one.ratio] for one in own]).T
+            y = heights + 0.2 * (len(bodies) - 1 - 2 * i) / max(len(bodies), 1)
+            errors = np.maximum(spans, 0.0) if np.isfinite(spans).all() else None
+            ratio.errorbar(values, y, xerr=errors, fmt="o", color=color, markersize=3.5, linewidth=1.0, label=body)
+        ratio.axvline(1.0, color="0.7", linewidth=0.8)
+        ratio.set(xlabel="speed over the reference's", yticks=heights, yticklabels=names)
+        ratio.legend(frameon=False)
+        panel_title(ratio, "Mean over tasks, 95 % intervals")
+        rank.plot([ranks[name] for name in names], heights, "o", color="0.2", markersize=3.5)
+        if isfinite(critical):
+            best = min(ranks.values())
+            rank.axvspan(best, best + critical, color="0.9", zorder=0)
+        rank.set(xlabel="mean rank over tasks, 1 the fastest")
+        panel_title(rank, "Grey: not told apart from the first")
         return save_both(figure, stem)
 
 
-def _point(axes: Any, name: str, x: tuple[float, ...], y: tuple[float, ...], color: Any, above: float) -> None:
-    """Draws a number with its interval in both directions and a name beside it; one that is infinite is left out."""
-    if not isfinite(x[0]):
-        return
-    spans = [[[max(of[0] - of[1], 0.0)], [max(of[2] - of[0], 0.0)]] if np.isfinite(of).all() else None for of in (x, y)]
-    axes.errorbar(x[0], y[0], xerr=spans[0], yerr=spans[1], fmt="o", color=color, markersize=4.0, linewidth=1.0)
-    # A share near 1 has no room to its right.
-    look: dict[str, Any] = {"xytext": (-4, above), "ha": "right"} if 0.7 < x[0] <= 1.0 else {"xytext": (4, above)}
-    axes.annotate(name, (x[0], y[0]), textcoords="offset points", fontsize=7.5, color="0.15", **look)
+def pairs_table(found: Sequence[Pair], reference: str) -> TerminalTable:
+    """Lays out every entrant beside the reference: how often it is faster, and what half the step makes of it."""
+    columns: Mapping[str, Callable[[Pair], str]] = {
+        "entrants": lambda one: f"{one.first} - {one.second}",
+        "body": lambda one: one.body,
+        "difference": lambda one: _with_interval(one.difference, one.difference_low, one.difference_high),
+        "faster": lambda one: _with_interval(one.faster, one.faster_low, one.faster_high),
+        "at half the step": lambda one: f"{one.at_half_step:+.2f}" if isfinite(one.at_half_step) else "-",
+        "same draws": lambda one: f"{one.at_step:+.2f}" if isfinite(one.at_step) else "-",
+    }
+    rows = [one for one in found if reference in (one.first, one.second)]
+    caption = "difference of speeds over the reference's; faster: share of tasks and draws"
+    return terminal_table(tabulated(rows, columns), f"Beside {reference}", n_words=2, caption=caption)

@@ -1,7 +1,8 @@
 """The tasks of the benchmark, frozen as data with a version, and the entrants: which run each pair of them makes.
 
 Both are TOML, ``tasks.toml`` and ``entrants.toml``; their comments describe the fields. A draw is a function of the
-version, the task's name and a seed. Seeds below `FIRST_TEST_SEED` are for training, the others for tests.
+version, the task's name and a seed, so that all entrants and both bodies have the same. Seeds below `FIRST_TEST_SEED`
+are for training, the others for tests.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
@@ -26,47 +28,58 @@ from annelid.experiment import Case
 from annelid.textfiles import read_toml
 
 REFERENCE = "timed"
-"""The entrant that the others are compared with: a wave by the clock, tuned once."""
+"""The entrant that the others are compared with: a wave by the clock, tuned once for each body."""
 FIRST_TEST_SEED = 1000
-QUICK_TASKS, QUICK_ENTRANTS = ("flat-middle", "slope", "noise"), (REFERENCE, "sine", "sns")
-QUICK_DRAWS, QUICK_DURATION_S = 2, 8.0
+QUICK_TASKS, QUICK_ENTRANTS, QUICK_BODIES = ("level", "slope"), (REFERENCE, "discrete", "sns"), ("three",)
+QUICK_DRAWS, QUICK_DURATION_S = 2, 6.0
+HALF_OF = 4
+"""One in so many draws is run at half the step, too."""
 DIGITS = 4
 """Significant digits of what is drawn."""
+MAY_SET = ("controller", "sensor.tolerance_m", "sensor.hysteresis_m")
+"""What an entrant may set: its controller, and the threshold of its stretch sensors."""
 
 
 class Range(Section):
-    """What a number is drawn from."""
+    """What a number is drawn from, or searched in."""
 
     low: float
     high: float
     log: bool = False
-    either_side: bool = False
+    whole: bool = False
 
     def draw(self, rng: np.random.Generator) -> float:
         """Draws a number."""
-        share, sign = rng.random(), rng.choice((-1.0, 1.0))
+        share = rng.random()
         value = self.low * (self.high / self.low) ** share if self.log else self.low + (self.high - self.low) * share
-        return float(f"{value * (sign if self.either_side else 1.0):.{DIGITS}g}")
+        return float(f"{value:.{DIGITS}g}")
+
+
+class Body(Section):
+    """A body, as its table in ``tasks.toml``."""
+
+    summary: str
+    preset: str
+    set: Mapping[str, Any] = {}
 
 
 class Task(Section):
     """A task, as its table in ``tasks.toml``."""
 
     summary: str
-    goal: Literal["ahead", "pipe", "heading"] = "ahead"
-    event_s: float | None = None
+    goal: Literal["ahead", "pipe"] = "ahead"
     set: Mapping[str, Any] = {}
     draw: Mapping[str, Range] = {}
 
 
 class Tasks(Section):
-    """All tasks, and what they share."""
+    """All tasks and bodies, and what they share."""
 
     version: int
-    preset: str
     settling_s: float
     friction_spread: float
     set: Mapping[str, Any]
+    bodies: Mapping[str, Body]
     tasks: Mapping[str, Task]
 
     def drawn(self, name: str, seed: int) -> dict[str, float]:
@@ -84,31 +97,49 @@ class Entrant(Section):
 
     summary: str = ""
     controller: Mapping[str, Any]
-    per_segment: Mapping[str, float] = {}
-    tuned_on: tuple[int, ...] | Mapping[str, tuple[int, ...]] = ()
+    on: Mapping[str, Mapping[str, Any]] = {}
+    """Fields by their dotted path, for a body (``three``) or for a task on a body (``three/slope``)."""
+    vary: Mapping[str, Range] = {}
+    """What was searched, and `tuning.tune` searches."""
+    each_task: bool = False
+    """Whether it was tuned for each task."""
+    tuned_on: tuple[int, ...] = ()
 
     @model_validator(mode="after")
     def _tuned_on_training_seeds(self) -> Self:
-        by_task = self.tuned_on if isinstance(self.tuned_on, Mapping) else {"all tasks": self.tuned_on}
-        test_seeds = {task: [seed for seed in seeds if seed >= FIRST_TEST_SEED] for task, seeds in by_task.items()}
-        if named := "; ".join(f"{task}: {', '.join(map(str, seeds))}" for task, seeds in test_seeds.items() if seeds):
-            raise ValueError(f"tuned_on has test seeds ({named}): tune on seeds below {FIRST_TEST_SEED}")
+        if test := [str(seed) for seed in self.tuned_on if seed >= FIRST_TEST_SEED]:
+            raise ValueError(f"tuned_on has test seeds ({', '.join(test)}): tune on seeds below {FIRST_TEST_SEED}")
+        for field in {field for own in self.on.values() for field in own} | set(self.vary):
+            if not any(field == one or field.startswith(f"{one}.") for one in MAY_SET):
+                raise ValueError(f"an entrant cannot set {field}, only {', '.join(MAY_SET)}")
         return self
 
-    def fields(self, n_segments: int) -> dict[str, Any]:
-        """Returns its controller for a number of segments."""
-        return {**self.controller, **{field: n_segments * value for field, value in self.per_segment.items()}}
+    def fields(self, body: str, task: str) -> dict[str, Any]:
+        """Returns what it sets for a task on a body."""
+        own = {**self.on.get(body, {}), **self.on.get(f"{body}/{task}", {})}
+        controller, others = deepcopy(dict(self.controller)), dict[str, Any]()
+        for path, value in own.items():
+            first, *between, last = path.split(".")
+            if first != "controller":
+                others[path] = value
+                continue
+            place = controller
+            for name in between:
+                place = place.setdefault(name, {})
+            place[last] = value
+        return {"controller": controller, **others}
 
 
 @dataclass(frozen=True)
 class Entry:
-    """One entrant at one task with one draw."""
+    """One entrant at one task, on one body, with one draw."""
 
     entrant: str  # Its name
+    body: str  # Name of the body
     task: str  # Name of the task
     seed: int  # Of the draw
+    finer: int  # How many times as short the body's steps are
     drawn: str  # What was drawn, as text
-    segments: int  # Of the worm
     case: Case  # Its run
 
     @property
@@ -125,7 +156,8 @@ def all_tasks() -> Tasks:
 
 
 @cache
-def _own_entrants() -> Mapping[str, Entrant]:
+def own_entrants() -> Mapping[str, Entrant]:
+    """Reads the entrants that come with annelid."""
     return read_entrants(_file("entrants.toml"))
 
 
@@ -160,7 +192,7 @@ def find_entrants(names: Sequence[str]) -> dict[str, Entrant]:
     Raises:
         ConfigError: One is unknown, cannot be read, or two bear one name.
     """
-    own = _own_entrants()
+    own = own_entrants()
     found = {REFERENCE: own[REFERENCE]}
     for name in names or own:
         if name.endswith(".toml"):
@@ -182,6 +214,7 @@ def entries(
     names: Sequence[str],
     seeds: Sequence[int],
     *,
+    bodies: Sequence[str] = (),
     finer: int = 1,
     duration_s: float | None = None,
 ) -> list[Entry]:
@@ -191,28 +224,31 @@ def entries(
         entrants: By their names.
         names: Of the tasks; none for all.
         seeds: Of the draws.
+        bodies: Names of the bodies; none for all.
         finer: How many times as short the bodies' steps are.
         duration_s: How long every run lasts; None for each task's own time.
 
     Raises:
-        ConfigError: A task is unknown.
+        ConfigError: A task or a body is unknown.
     """
     found = all_tasks()
-    for name in names:
-        if name not in found.tasks:
-            raise ConfigError(f"unknown task {name!r}: {suggest(name, found.tasks)}")
+    for kind, given, known in (("task", names, found.tasks), ("body", bodies, found.bodies)):
+        for name in given:
+            if name not in known:
+                raise ConfigError(f"unknown {kind} {name!r}: {suggest(name, known)}")
     made = []
-    for name in names or found.tasks:
-        shared = {**found.set, **found.tasks[name].set}
-        if finer != 1:
-            shared["clock.physics_timestep_s"] = round(shared["clock.physics_timestep_s"] / finer, 9)
-        if duration_s is not None:
-            shared["duration_s"] = duration_s
-        segments = int(shared.get("body.mesh.n_segments", 3))
-        for seed in seeds:
-            drawn = found.drawn(name, seed)
-            changes, listed = {**shared, **drawn, "seed": seed}, " ".join(f"{name}={x:g}" for name, x in drawn.items())
-            for entrant, its in entrants.items():
-                case = Case(found.preset, {**changes, "controller": its.fields(segments)})
-                made.append(Entry(entrant, name, seed, listed, segments, case))
+    for body in bodies or found.bodies:
+        for name in names or found.tasks:
+            shared = {**found.set, **found.bodies[body].set, **found.tasks[name].set}
+            if finer != 1:
+                shared["clock.physics_timestep_s"] = round(shared["clock.physics_timestep_s"] / finer, 9)
+            if duration_s is not None:
+                shared["duration_s"] = duration_s
+            for seed in seeds:
+                drawn = found.drawn(name, seed)
+                listed = " ".join(f"{field}={x:g}" for field, x in drawn.items())
+                for entrant, its in entrants.items():
+                    changes = {**shared, **drawn, "seed": seed, **its.fields(body, name)}
+                    case = Case(found.bodies[body].preset, changes)
+                    made.append(Entry(entrant, body, name, seed, finer, listed, case))
     return made

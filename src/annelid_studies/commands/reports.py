@@ -187,22 +187,21 @@ def challenge_command(
     task: Annotated[
         list[str] | None, typer.Option(metavar="NAME", help="Only this task; may be repeated.  [default: all]")
     ] = None,
-    draws: Annotated[int, typer.Option(min=1, max=1000, help="Draws of every task.")] = 8,
-    first_seed: Annotated[
-        int, typer.Option(min=0, max=2**32 - 1, help="Seed of the first draw; those below 1000 are for training.")
-    ] = 1000,
-    quick: Annotated[
-        bool, typer.Option("--quick", help="Three tasks, three entrants, two draws, short runs: under five minutes.")
-    ] = False,
-    finer: Annotated[
-        int, typer.Option(min=1, max=10, metavar="N", help="Divide the physics step by N: by 2, or 10 ms by 5.")
-    ] = 1,
-    against: Annotated[
-        list[Path] | None,
-        typer.Option(
-            metavar="RUNS.csv", help="Compare the ranking with that of another call, by Kendall's tau; may be repeated."
-        ),
+    body: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME", help="Only this body, three or six; may be repeated.  [default: both]"),
     ] = None,
+    draws: Annotated[int, typer.Option(min=1, max=1000, help="Draws of every task.")] = 8,
+    half_step: Annotated[
+        bool, typer.Option("--half-step/--no-half-step", help="Run one draw in four at half the step, too.")
+    ] = True,
+    tune: Annotated[
+        int | None,
+        typer.Option(min=1, max=10000, metavar="N", help="Search the entrants' fields in N trials, and rank nothing."),
+    ] = None,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Two tasks, three entrants, one body, two draws: under five minutes.")
+    ] = False,
     known: Annotated[
         list[Path] | None,
         typer.Option("--with", metavar="RUNS.csv", help="Use the runs of another call; may be repeated."),
@@ -213,42 +212,56 @@ def challenge_command(
 ) -> None:
     """Rank controllers in a benchmark of crawling.
 
-    Every entrant runs every task in the same body, with the same random draws, and cannot see the draws. A tuned wave
-    by the clock always runs too, as the reference. Writes runs.csv, one row per run; scores.csv, means with 95 %
-    intervals by entrant and task; tasks.csv, one row per task; challenge.png and .svg. Runs are kept, so the same
-    command continues after an interruption. The whole takes a few hours on two cores. docs/evidence/challenge.md has
-    tasks, rules and results.
+    Every entrant runs every task on both bodies with the same draws, and is built without knowing them. The tuned
+    timed wave always runs too, as the reference. Writes runs.csv, one row per run; scores.csv, means with 95 %
+    intervals; pairs.csv, every two entrants on the same draws; challenge.png and .svg. Runs are kept: a second call
+    takes seconds, and the same command continues an interrupted one. The whole takes a night on two cores;
+    docs/evidence/challenge.md has tasks, rules and results.
+
+    With --tune it searches the fields that entrants list under `vary`, on training draws, and writes entrants.toml.
 
     \b
-    annelid study challenge --quick                 in minutes
-    annelid study challenge                         all entrants, all tasks
-    annelid study challenge mine:Controller --task slope --draws 4
-    annelid study challenge mine.toml --with published/runs.csv
-    annelid study challenge --finer 2 -o half
-    annelid study challenge --against half/runs.csv is the ranking the same?
+    annelid study challenge --quick                                   in minutes
+    annelid study challenge                                           all entrants, tasks and bodies
+    annelid study challenge mine:Controller --task slope --draws 4    your own, against the reference
+    annelid study challenge mine.toml --with published/runs.csv       only yours is computed
+    annelid study challenge mine.toml --tune 48 -o tuned              tune yours as ours were
     """
     from annelid_studies.challenge import report, tasks
-    from annelid_studies.challenge.ranking import Standing, agreement, mean_speeds, standings
+    from annelid_studies.challenge.ranking import Pair, Speeds, Standing, half_step_changes, pairs, standings
     from annelid_studies.challenge.scores import Score, challenge, read_scores
+    from annelid_studies.challenge.tuning import tune as tuned
+    from annelid_studies.challenge.tuning import write_entrants
 
     if quick:
         entrants, task = entrants or [*tasks.QUICK_ENTRANTS], task or [*tasks.QUICK_TASKS]
-        draws = min(draws, tasks.QUICK_DRAWS)
-    seeds = range(first_seed, first_seed + draws)
-    others = [mean_speeds(read_scores(path)) for path in against or []]
-    earlier = [one for path in known or [] for one in read_scores(path)]
+        body, draws, half_step = body or [*tasks.QUICK_BODIES], min(draws, tasks.QUICK_DRAWS), False
     duration_s = tasks.QUICK_DURATION_S if quick else None
     found = tasks.find_entrants(entrants or [])
-    wanted = tasks.entries(found, task or [], seeds, finer=finer, duration_s=duration_s)
+    if tune is not None:
+        if entrants:
+            found = {name: one for name, one in found.items() if name != tasks.REFERENCE or name in entrants}
+        with kept_runs(output, jobs=jobs, quiet=quiet) as store:
+            best = tuned(found, tune, store, bodies=body or [], tasks=task or [], duration_s=duration_s)
+        print_results([write_entrants(best, output / "entrants.toml")], quiet=quiet)
+        return
+    earlier = [one for path in known or [] for one in read_scores(path)]
+    seeds = range(tasks.FIRST_TEST_SEED, tasks.FIRST_TEST_SEED + draws)
+    wanted = tasks.entries(found, task or [], seeds, bodies=body or [], duration_s=duration_s)
+    if half_step:
+        some = seeds[: -(-draws // tasks.HALF_OF)]
+        wanted += tasks.entries(found, task or [], some, bodies=body or [], finer=2, duration_s=duration_s)
     with kept_runs(output, jobs=jobs, quiet=quiet) as store:
         scores = challenge(store, wanted, earlier)
-    ranked = standings(scores)
-    taus = [agreement(mean_speeds(scores), other) for other in others]
+    ranked, compared, changes = standings(scores), pairs(scores), half_step_changes(scores)
     written = [
         report.write_rows(Score, scores, output / "runs.csv"),
         report.write_rows(Standing, ranked, output / "scores.csv"),
-        report.write_tasks(ranked, taus, output / "tasks.csv"),
-        report.ranking_figure(ranked, output / "challenge"),
+        report.write_rows(Pair, compared, output / "pairs.csv"),
+        report.ranking_figure(ranked, Speeds([one for one in scores if one.finer == 1]), output / "challenge"),
     ]
-    tables = report.ranking_table(ranked), report.speed_table(ranked, taus)
+    tables = [report.ranking_table(ranked, changes), report.speed_table(ranked)]
+    tables.append(report.pairs_table(compared, tasks.REFERENCE))
+    if any(one.refused for one in scores):
+        tables.append(report.refused_table(scores))
     print_results(written, *tables, quiet=quiet)

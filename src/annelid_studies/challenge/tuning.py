@@ -1,0 +1,141 @@
+"""Tunes entrants of the benchmark on training seeds, each with the same budget on each body."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import tomlkit
+
+from annelid.errors import ConfigError, MissingDependency
+from annelid.experiment import Store
+from annelid.output import write_text
+from annelid_studies.challenge.scores import challenge
+from annelid_studies.challenge.tasks import DIGITS, Entrant, Range, all_tasks, entries
+
+SEARCHED, FINAL = "level", ("level", "friction", "slope")
+"""Task of the search, and tasks of the final round; for an entrant with ``each_task``, both are its task."""
+SEEDS = (0, 1)
+"""Training seeds: the search has the first, the final round all."""
+FINALISTS = 4
+GENERATION = 8
+"""Trials that are asked for at once."""
+
+
+def tune(
+    entrants: Mapping[str, Entrant],
+    n_trials: int,
+    store: Store,
+    *,
+    bodies: Sequence[str] = (),
+    tasks: Sequence[str] = (),
+    duration_s: float | None = None,
+) -> dict[str, Entrant]:
+    """Searches the fields that entrants vary, for speed.
+
+    Optuna's tree-structured Parzen estimator asks for trials on one training draw; the fastest of them run more draws,
+    and the one with the largest mean speed there is taken. A refused run counts as speed 0. Called again, it finds the
+    runs that are in the store.
+
+    Args:
+        entrants: By their names; those without ``vary`` stay as they are.
+        n_trials: Trials of each search.
+        store: Store of the runs.
+        bodies: Names of the bodies; none for all.
+        tasks: Tasks of the entrants that are tuned for each; none for all.
+        duration_s: How long every run lasts; None for each task's own time.
+
+    Returns:
+        The entrants with what was found.
+
+    Raises:
+        MissingDependency: Optuna is not installed.
+        ConfigError: None of the entrants varies anything.
+    """
+    if not any(one.vary for one in entrants.values()):
+        raise ConfigError(f"none of {', '.join(entrants)} says in `vary` what is searched")
+    found = {}
+    for name, entrant in entrants.items():
+        own = dict(entrant.on)
+        for body in bodies or all_tasks().bodies if entrant.vary else ():
+            places = [(f"{body}/{task}", task, (task,)) for task in tasks or all_tasks().tasks]
+            for place, searched, final in places if entrant.each_task else [(body, SEARCHED, FINAL)]:
+                search = _Search(entrant, body, searched, store, duration_s)
+                best = search.best(search.trials(n_trials), final)
+                own[place] = {**entrant.on.get(place, {}), **best}
+        found[name] = entrant.model_copy(update={"on": own, "tuned_on": SEEDS if entrant.vary else entrant.tuned_on})
+    return found
+
+
+class _Search:
+    """One search of one entrant on one body."""
+
+    def __init__(self, entrant: Entrant, body: str, task: str, store: Store, duration_s: float | None) -> None:
+        self._entrant, self._body, self._task, self._store, self._duration_s = entrant, body, task, store, duration_s
+        first = entries({"": entrant}, [task], SEEDS[:1], bodies=[body])[0]
+        self._n_segments = first.case.config.body.n_segments
+
+    def trials(self, n_trials: int) -> list[tuple[float, dict[str, Any]]]:
+        """Runs the search; speeds and fields of its trials, the fastest first."""
+        optuna = _optuna()
+        with warnings.catch_warnings():
+            # The sampler's options are called experimental.
+            warnings.simplefilter("ignore")
+            sampler = optuna.samplers.TPESampler(
+                seed=0, n_startup_trials=2 * GENERATION, multivariate=True, constant_liar=True
+            )
+        study = optuna.create_study(sampler=sampler, direction="maximize")
+        ranges = {field: self._range(among) for field, among in self._entrant.vary.items()}
+        done: list[tuple[float, dict[str, Any]]] = []
+        while len(done) < n_trials:
+            asked = [study.ask(ranges) for _ in range(min(GENERATION, n_trials - len(done)))]
+            tried = [{field: _rounded(value) for field, value in trial.params.items()} for trial in asked]
+            speeds = self._speeds(tried, [self._task], SEEDS[:1])
+            for trial, speed in zip(asked, speeds, strict=True):
+                study.tell(trial, speed)
+            done += zip(speeds, tried, strict=True)
+        return sorted(done, key=lambda one: -one[0])
+
+    def best(self, trials: Sequence[tuple[float, dict[str, Any]]], tasks: Sequence[str]) -> dict[str, Any]:
+        """Returns the fields of the fastest trials that are fastest on all training draws."""
+        finalists = [fields for _, fields in trials[:FINALISTS]]
+        speeds = self._speeds(finalists, tasks, SEEDS)
+        return finalists[max(range(len(finalists)), key=lambda i: speeds[i])]
+
+    def _speeds(self, tried: Sequence[dict[str, Any]], tasks: Sequence[str], seeds: Sequence[int]) -> list[float]:
+        """Mean speeds of settings, m/s."""
+        named = {
+            str(i): self._entrant.model_copy(update={"on": {self._body: fields}}) for i, fields in enumerate(tried)
+        }
+        wanted = entries(named, tasks, seeds, bodies=[self._body], duration_s=self._duration_s)
+        scores = challenge(self._store, wanted)
+        n = len(tasks) * len(seeds)
+        return [sum(one.speed_m_per_s for one in scores if one.entrant == name) / n for name in named]
+
+    def _range(self, among: Range) -> Any:
+        kinds = _optuna().distributions
+        if among.whole:
+            # A pattern has fewer segments than the body.
+            return kinds.IntDistribution(int(among.low), min(int(among.high), self._n_segments - 1))
+        return kinds.FloatDistribution(among.low, among.high, log=among.log)
+
+
+def _rounded(value: float) -> float:
+    return value if isinstance(value, int) else float(f"{value:.{DIGITS}g}")
+
+
+def _optuna() -> Any:
+    try:
+        import optuna
+    except ImportError:
+        raise MissingDependency("tuning needs Optuna: install it with  pip install 'annelid[tune]'") from None
+    optuna.logging.set_verbosity(optuna.logging.ERROR)
+    return optuna
+
+
+def write_entrants(entrants: Mapping[str, Entrant], path: Path) -> Path:
+    """Writes a file of entrants, which `tasks.read_entrants` reads."""
+    tables = {name: one.model_dump(mode="json", exclude_defaults=True) for name, one in entrants.items()}
+    return write_text(path, tomlkit.dumps(tables))

@@ -143,7 +143,7 @@ def test_an_entrant_that_reads_the_seed_reads_nothing(tmp_path: Path) -> None:
             return SeedReader(0.1 * config.seed + arena + 100 * config.sensor.noise_m + ground, plant.n_muscles)
 
     mine, store = Entrant(controller={"kind": "seed-reading"}), Store(tmp_path)
-    wanted = entries({"mine": mine}, ["noise"], [1000, 1001], bodies=["three"], duration_s=0.06)
+    wanted = entries({"mine": mine}, ["sensors"], [1000, 1001], bodies=["three"], duration_s=0.06)
     assert not any(one.refused for one in challenge(store, wanted))
     levels = {float(level) for each in wanted for level in store.run(each.case).data["activation"].values[1:].ravel()}
     assert len(levels) == 1

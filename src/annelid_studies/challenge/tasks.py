@@ -50,7 +50,10 @@ class Range(Section):
 
     def draw(self, rng: np.random.Generator) -> float:
         """Draws a number."""
-        share = rng.random()
+        return self.at(rng.random())
+
+    def at(self, share: float) -> float:
+        """Returns the number at a share of the range."""
         value = self.low * (self.high / self.low) ** share if self.log else self.low + (self.high - self.low) * share
         return float(f"{value:.{DIGITS}g}")
 

@@ -218,7 +218,8 @@ def challenge_command(
     takes seconds, and the same command continues an interrupted one. The whole takes a night on two cores;
     docs/evidence/challenge.md has tasks, rules and results.
 
-    With --tune it searches the fields that entrants list under `vary`, on training draws, and writes entrants.toml.
+    With --tune it searches the fields that entrants list under `vary`, on training draws. It writes entrants.toml and
+    trials.csv.
 
     \b
     annelid study challenge --quick                                   in minutes
@@ -230,8 +231,8 @@ def challenge_command(
     from annelid_studies.challenge import report, tasks
     from annelid_studies.challenge.ranking import Pair, Speeds, Standing, half_step_changes, pairs, standings
     from annelid_studies.challenge.scores import Score, challenge, read_scores
+    from annelid_studies.challenge.tuning import Trial, write_entrants
     from annelid_studies.challenge.tuning import tune as tuned
-    from annelid_studies.challenge.tuning import write_entrants
 
     if quick:
         entrants, task = entrants or [*tasks.QUICK_ENTRANTS], task or [*tasks.QUICK_TASKS]
@@ -242,8 +243,12 @@ def challenge_command(
         if entrants:
             found = {name: one for name, one in found.items() if name != tasks.REFERENCE or name in entrants}
         with kept_runs(output, jobs=jobs, quiet=quiet) as store:
-            best = tuned(found, tune, store, bodies=body or [], tasks=task or [], duration_s=duration_s)
-        print_results([write_entrants(best, output / "entrants.toml")], quiet=quiet)
+            best, trials = tuned(found, tune, store, bodies=body or [], tasks=task or [], duration_s=duration_s)
+        written = [
+            write_entrants(best, output / "entrants.toml"),
+            report.write_rows(Trial, trials, output / "trials.csv"),
+        ]
+        print_results(written, quiet=quiet)
         return
     earlier = [one for path in known or [] for one in read_scores(path)]
     seeds = range(tasks.FIRST_TEST_SEED, tasks.FIRST_TEST_SEED + draws)

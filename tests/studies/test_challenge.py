@@ -26,7 +26,7 @@ from annelid_studies.faults import Faults
 
 pytestmark = pytest.mark.usefixtures("runs_in_this_process")
 
-SCORE = Score(REFERENCE, "three", "slope", 3, 1000, 1, "", "setup", "key", "", 0.05, 0.5, 1.0, 10.0, 12.0, True)
+SCORE = Score(REFERENCE, "three", "slope", 3, 1000, 1, "", "setup", "key", "", 0.05, 0.5, 1.0, 10.0, 12.0, True, 0.7)
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import astuple
-from math import isfinite
+from math import isfinite, isnan, nan
 from pathlib import Path
 from typing import Any
 
@@ -62,6 +62,20 @@ def speed_table(found: Sequence[Standing]) -> TerminalTable:
     cells = grouped((one for one in found if one.task != ALL), lambda one: (one.body, one.task))
     rows = [[body, task, *(f"{CM * one.speed_m_per_s:.2f}" for one in own)] for (body, task), own in cells.items()]
     return terminal_table(Table(["body", "task", *names], rows), "Mean speed (cm/s)", n_words=2)
+
+
+def own_bodies_table(scores: Sequence[Score]) -> TerminalTable:
+    """Lays out mean speeds of the entrants that brought their body."""
+    rows = []
+    for key, own in grouped(scores, lambda one: (one.entrant, one.body, one.task)).items():
+        speed = np.array([one.speed_m_per_s for one in own])
+        lengths = (
+            float(np.nanmean(speed / [one.length_m for one in own])) if any(not one.refused for one in own) else nan
+        )
+        refused = f"{sum(bool(one.refused) for one in own)} of {len(own)}"
+        rows.append([*key, f"{CM * speed.mean():.2f}", "-" if isnan(lengths) else f"{lengths:.3f}", refused])
+    heads = ["entrant", "body", "task", "speed (cm/s)", "body lengths/s", "refused"]
+    return terminal_table(Table(heads, rows), "With a body of their own", n_words=3)
 
 
 def refused_table(scores: Sequence[Score]) -> TerminalTable:

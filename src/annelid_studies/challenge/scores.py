@@ -24,7 +24,7 @@ NUMERICAL_SHARE = 0.05
 
 Where it is less, speed at the bodies' steps is within some 5 % of that at finer ones (docs/evidence/challenge.md).
 """
-_EMPTY: dict[str, str] = dict.fromkeys(("slip_J", "work_J", "electric_J"), "nan")
+_EMPTY: dict[str, str] = dict.fromkeys(("slip_J", "work_J", "electric_J", "length_m"), "nan")
 """What an empty cell of these columns of ``runs.csv`` stands for."""
 
 
@@ -48,6 +48,7 @@ class Score:
     work_J: float  # Positive work of the muscles in that time
     electric_J: float  # Energy that the motors of `electric_energy_J` take in that time
     in_order: bool  # Whether segments lengthen in one wave from front to rear, to the end
+    length_m: float  # Of the body at rest
 
 
 def challenge(store: Store, wanted: Sequence[Entry], known: Sequence[Score] = ()) -> list[Score]:
@@ -91,18 +92,21 @@ def _score(entry: Entry, refused: str, store: Store) -> Score:
     settling_s = found.settling_s
     named = entry.entrant, entry.body, entry.task, found.version, entry.seed, entry.finer, entry.drawn, entry.setup
     if refused:
-        return Score(*named, key, refused, 0.0, 0.0, nan, nan, nan, False)
+        return Score(*named, key, refused, 0.0, 0.0, nan, nan, nan, False, nan)
     run = store.run(entry.case)
     time, way = progress(run, found.tasks[entry.task])
     first = int(np.searchsorted(time, settling_s - 1e-9))
     distance = float(way[-1] - way[first])
     judged = run.data.isel(time=run.data["time"].values >= settling_s - 1e-9)
-    slip, work = (float((judged[name][-1] - judged[name][0]).sum()) for name in ("slip_loss", "positive_work"))
-    electric = electric_energy_J(judged["time"].values, judged["muscle_force"].values, judged["ring_length"].values)
+    slip = work = electric = nan
+    if "slip_loss" in judged and "positive_work" in judged:  # Robots of MJCF have none.
+        slip, work = (float((judged[name][-1] - judged[name][0]).sum()) for name in ("slip_loss", "positive_work"))
+        electric = electric_energy_J(judged["time"].values, judged["muscle_force"].values, judged["ring_length"].values)
     speed = distance / float(time[-1] - time[first])
     speed, distance, slip, work, electric = (float(f"{one:.6g}") for one in (speed, distance, slip, work, electric))
     in_order = lengthening_score(run, settling_s).is_one_wave
-    return Score(*named, key, "", speed, distance, slip, work, electric, in_order)
+    length_m = float(run.data.attrs.get("body_length_m", nan))
+    return Score(*named, key, "", speed, distance, slip, work, electric, in_order, length_m)
 
 
 def progress(run: Run, task: Task) -> tuple[np.ndarray, np.ndarray]:

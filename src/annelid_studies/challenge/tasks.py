@@ -21,7 +21,7 @@ from zlib import crc32
 import numpy as np
 from pydantic import model_validator
 
-from annelid.config import Section, check_section
+from annelid.config import Section, check_section, load_config
 from annelid.control import own_controller
 from annelid.errors import ConfigError, suggest
 from annelid.experiment import Case
@@ -85,6 +85,12 @@ class Tasks(Section):
     bodies: Mapping[str, Body]
     tasks: Mapping[str, Task]
 
+    @property
+    def walking(self) -> list[str]:
+        """Names of the tasks of walking on open ground, which bodies of other kinds can be given."""
+        fields = {name: {*task.set, *task.draw} for name, task in self.tasks.items() if task.goal == "ahead"}
+        return [name for name, own in fields.items() if all(field.startswith("arena.") for field in own)]
+
     def drawn(self, name: str, seed: int) -> dict[str, float]:
         """Returns the fields that are drawn for a seed of a task."""
         task = self.tasks[name]
@@ -99,6 +105,8 @@ class Entrant(Section):
     """An entrant, as its table in a file."""
 
     summary: str = ""
+    preset: str | None = None
+    """A body of its own, for the tasks of walking: a preset, or a TOML or MJCF file beside the entrant's."""
     controller: Mapping[str, Any]
     on: Mapping[str, Mapping[str, Any]] = {}
     """Fields by their dotted path, for a body (``three``) or for a task on a body (``three/slope``)."""
@@ -179,9 +187,15 @@ def read_entrants(path: Path) -> dict[str, Entrant]:
         if not isinstance(fields, Mapping):
             raise ConfigError(f"{path}: {name} is no table: an entrant is a table [NAME] with its controller")
         try:
-            found[name] = check_section(Entrant, fields)
+            one = check_section(Entrant, fields)
+            if one.preset is not None:
+                is_file = one.preset.endswith((".toml", ".xml"))
+                preset = str(path.parent / one.preset) if is_file else one.preset
+                load_config(preset)
+                one = one.model_copy(update={"preset": preset})
         except ConfigError as error:
             raise ConfigError(f"{path}, entrant {name}: {error}") from None
+        found[name] = one
     return found
 
 
@@ -223,6 +237,9 @@ def entries(
 ) -> list[Entry]:
     """Lays out the runs of entrants at tasks.
 
+    An entrant that brings its body runs the tasks of walking with it, and only the first of them if the body has its
+    ground. All others run all tasks on all bodies.
+
     Args:
         entrants: By their names.
         names: Of the tasks; none for all.
@@ -239,19 +256,33 @@ def entries(
         for name in given:
             if name not in known:
                 raise ConfigError(f"unknown {kind} {name!r}: {suggest(name, known)}")
+    given = [(name, found.bodies[name], "") for name in bodies or found.bodies]
+    given += [
+        (Path(one.preset).stem, Body(summary="", preset=one.preset), name)
+        for name, one in entrants.items()
+        if one.preset
+    ]
     made = []
-    for body in bodies or found.bodies:
+    for body, its_body, owner in given:
+        config = load_config(its_body.preset, dict(its_body.set))
+        runners = {name: one for name, one in entrants.items() if (name == owner if owner else one.preset is None)}
         for name in names or found.tasks:
-            shared = {**found.set, **found.bodies[body].set, **found.tasks[name].set}
+            if owner and name not in (found.walking if config.arena is not None else found.walking[:1]):
+                continue
+            shared = {**found.set, **its_body.set, **found.tasks[name].set}
             if finer != 1:
-                shared["clock.physics_timestep_s"] = round(shared["clock.physics_timestep_s"] / finer, 9)
+                shared["clock.physics_timestep_s"] = round(config.clock.physics_timestep_s / finer, 9)
             if duration_s is not None:
                 shared["duration_s"] = duration_s
             for seed in seeds:
                 drawn = found.drawn(name, seed)
                 listed = " ".join(f"{field}={x:g}" for field, x in drawn.items())
-                for entrant, its in entrants.items():
+                for entrant, its in runners.items():
                     changes = {**shared, **drawn, "seed": seed, **its.fields(body, name)}
-                    case = Case(found.bodies[body].preset, changes)
+                    if owner:
+                        # Its control steps may be of another length, and it may have a ground of its own.
+                        left_out = ("record.",) if config.arena is not None else ("record.", "arena.")
+                        changes = {field: value for field, value in changes.items() if not field.startswith(left_out)}
+                    case = Case(its_body.preset, changes)
                     made.append(Entry(entrant, body, name, seed, finer, listed, case))
     return made

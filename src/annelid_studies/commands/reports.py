@@ -257,16 +257,20 @@ def challenge_command(
         some = seeds[: -(-draws // tasks.HALF_OF)]
         wanted += tasks.entries(found, task or [], some, bodies=body or [], finer=2, duration_s=duration_s)
     with kept_runs(output, jobs=jobs, quiet=quiet) as store:
-        scores = challenge(store, wanted, earlier)
+        every = challenge(store, wanted, earlier)
+    of_own = [one for one in every if found[one.entrant].preset is not None]
+    scores = [one for one in every if found[one.entrant].preset is None]
     ranked, compared, changes = standings(scores), pairs(scores), half_step_changes(scores)
     written = [
-        report.write_rows(Score, scores, output / "runs.csv"),
+        report.write_rows(Score, every, output / "runs.csv"),
         report.write_rows(Standing, ranked, output / "scores.csv"),
         report.write_rows(Pair, compared, output / "pairs.csv"),
         report.ranking_figure(ranked, Speeds([one for one in scores if one.finer == 1]), output / "challenge"),
     ]
     tables = [report.ranking_table(ranked, changes), report.speed_table(ranked)]
     tables.append(report.pairs_table(compared, tasks.REFERENCE))
-    if any(one.refused for one in scores):
-        tables.append(report.refused_table(scores))
+    if of_own:
+        tables.append(report.own_bodies_table([one for one in of_own if one.finer == 1]))
+    if any(one.refused for one in every):
+        tables.append(report.refused_table(every))
     print_results(written, *tables, quiet=quiet)

@@ -212,10 +212,15 @@ def _uncertainty(job: Job) -> Path:
     return uncertainty_figure(rows, job.stem.with_suffix(".png"))
 
 
+def _challenge(job: Job) -> Path:
+    from annelid_studies.challenge import report, scores
+
+    return report.ranking_figure(scores.read_scores(job.results), job.stem)
+
+
 def makers() -> Mapping[str, Callable[[Job], Path]]:
     """All that an entry of the list can ask for."""
     from annelid_studies import riddle2025
-    from annelid_studies.challenge import ranking, report
 
     return {
         **dict.fromkeys(("frame", "figure7", "track", "video"), _of_run),
@@ -223,7 +228,7 @@ def makers() -> Mapping[str, Callable[[Job], Path]]:
         "sweep": _sweep,
         "command": _command,
         "slip": _slip,
-        "challenge": partial(_fields, report.ranking_figure, ranking.Standing),
+        "challenge": _challenge,
         "riddle2025": partial(_fields, riddle2025.comparison_picture, riddle2025.Reading),
         "bench": _bench,
         "tuning": _tuning,

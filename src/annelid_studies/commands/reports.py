@@ -193,7 +193,7 @@ def challenge_command(
     ] = None,
     draws: Annotated[int, typer.Option(min=1, max=1000, help="Draws of every task.")] = 8,
     half_step: Annotated[
-        bool, typer.Option("--half-step/--no-half-step", help="Run one draw in four at half the step, too.")
+        bool, typer.Option("--half-step/--no-half-step", help="Run one draw in eight at half the step, too.")
     ] = True,
     tune: Annotated[
         int | None,
@@ -229,7 +229,7 @@ def challenge_command(
     annelid study challenge mine.toml --tune 48 -o tuned              tune yours as ours were
     """
     from annelid_studies.challenge import report, tasks
-    from annelid_studies.challenge.ranking import Pair, Speeds, Standing, half_step_changes, pairs, standings
+    from annelid_studies.challenge.ranking import Pair, Standing, half_step_changes, pairs, standings
     from annelid_studies.challenge.scores import Score, challenge, read_scores
     from annelid_studies.challenge.tuning import Trial, write_entrants
     from annelid_studies.challenge.tuning import tune as tuned
@@ -265,7 +265,7 @@ def challenge_command(
         report.write_rows(Score, every, output / "runs.csv"),
         report.write_rows(Standing, ranked, output / "scores.csv"),
         report.write_rows(Pair, compared, output / "pairs.csv"),
-        report.ranking_figure(ranked, Speeds([one for one in scores if one.finer == 1]), output / "challenge"),
+        report.ranking_figure(scores, output / "challenge"),
     ]
     tables = [report.ranking_table(ranked, changes), report.speed_table(ranked)]
     tables.append(report.pairs_table(compared, tasks.REFERENCE))

@@ -201,6 +201,21 @@ def test_an_interval_holds_the_mean_of_tasks_and_draws_as_often_as_it_says() -> 
     assert 175 <= held <= 199, "95 % of 200, less what a percentile bootstrap of 20 tasks lacks"
 
 
+def test_energies_of_a_pair_are_compared_on_the_runs_that_both_finish() -> None:
+    rng = np.random.default_rng(2)
+    rows = [
+        replace(SCORE, task=task, seed=seed, slip_J=float(rng.uniform(1.0, 2.0)))
+        for task in ("slope", "level")
+        for seed in range(4)
+    ]
+    rows += [replace(one, entrant="mine", slip_J=1.5 * one.slip_J, work_J=0.5 * one.work_J) for one in rows]
+    rows[-1] = replace(rows[-1], refused="wild", slip_J=nan, work_J=nan, distance_m=0.0)
+    rows[-2] = replace(rows[-2], slip_J=1e6, distance_m=-0.1)
+    overall = next(one for one in pairs(rows) if one.body == ALL)
+    assert (overall.slip_low, overall.slip, overall.slip_high) == pytest.approx((1 / 1.5,) * 3, rel=1e-3)
+    assert overall.work == pytest.approx(2.0)
+
+
 def test_a_pair_whose_order_turns_at_half_the_step_says_so() -> None:
     rows = [replace(SCORE, seed=seed, finer=finer) for seed in (0, 1, 2) for finer in (1, 2) if finer == 1 or seed == 0]
     fast = {1: 0.06, 2: 0.04}

@@ -122,9 +122,10 @@ def pairs_table(found: Sequence[Pair], reference: str) -> TerminalTable:
         "body": lambda one: one.body,
         "difference": lambda one: _with_interval(one.difference, one.difference_low, one.difference_high),
         "faster": lambda one: _with_interval(one.faster, one.faster_low, one.faster_high),
+        "slip": lambda one: _with_interval(one.slip, one.slip_low, one.slip_high),
         "at half the step": lambda one: f"{one.at_half_step:+.2f}" if isfinite(one.at_half_step) else "-",
         "same draws": lambda one: f"{one.at_step:+.2f}" if isfinite(one.at_step) else "-",
     }
     rows = [one for one in found if reference in (one.first, one.second)]
-    caption = "difference of speeds over the reference's; faster: share of tasks and draws"
+    caption = "difference of speeds over the reference's; faster: share of tasks and draws; slip: first over second"
     return terminal_table(tabulated(rows, columns), f"Beside {reference}", n_words=2, caption=caption)

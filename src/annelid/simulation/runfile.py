@@ -22,6 +22,7 @@ from annelid.errors import ConfigError, RunFileError, UnreadableText
 from annelid.registry import Registry
 from annelid.simulation import digest
 from annelid.simulation.checkpoint import Checkpoint, newest_payload
+from annelid.simulation.container import WITHOUT_LABELS
 from annelid.simulation.lock import LOCK_NAME
 from annelid.textfiles import parse_json
 
@@ -160,7 +161,7 @@ def _variables(content: Any, written: dict[str, int]) -> dict[str, Recorded]:
     variables, sizes = dict[str, Recorded](), dict(written)
     for name, variable in content.items():
         # A dimension without labels has no variable.
-        only_size = variable.attrs.get("NAME", b"").startswith(b"This is a netCDF dimension but not")
+        only_size = variable.attrs.get("NAME", b"").startswith(WITHOUT_LABELS.encode())
         if only_size or name in (*_BOOKKEEPING, WARNINGS, CPU_TIME, "checkpoint"):
             continue
         dims = (name,) if variable.is_scale else tuple(dim[0].name.lstrip("/") for dim in variable.dims)
@@ -179,7 +180,7 @@ def _variables(content: Any, written: dict[str, int]) -> dict[str, Recorded]:
 
 def _attributes(part: Any) -> dict[str, Any]:
     """The attributes of an open file or of one of its variables; what netCDF-4 keeps as a list of one is that one."""
-    kept = {name: value for name, value in part.attrs.items() if name not in _OF_THE_FORMAT and name[:2] != "_N"}
+    kept = {name: part.attrs[name] for name in part.attrs if name not in _OF_THE_FORMAT and name[:2] != "_N"}
     return {name: value[0] if np.shape(value) == (1,) else value for name, value in kept.items()}
 
 

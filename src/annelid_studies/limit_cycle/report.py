@@ -32,7 +32,6 @@ def cycle_numbers(cycle: LimitCycle) -> dict[str, Any]:
     """Returns the same numbers for JSON: multipliers as pairs of real and imaginary part, times in s."""
     return {
         "period_s": cycle.period_s,
-        "timestep_s": cycle.timestep_s,
         "closing_error": cycle.closing_error,
         "multipliers": [[float(value.real), float(value.imag)] for value in cycle.multipliers],
         "trivial": cycle.trivial,

@@ -10,6 +10,7 @@ from annelid.body.worm import WormBody
 from annelid.config import load_config
 from annelid.draw.camera import picture_axes
 from annelid.draw.scene import render_still
+from annelid.draw.strands import POINTS_PER_SIDE
 from annelid.errors import ConfigError, RunFileError
 from annelid.morphology import MeshGeometry
 from annelid.simulation.runfile import Run
@@ -48,19 +49,18 @@ def test_strands_of_a_recorded_posture_pass_through_the_pins(rods_run: Run) -> N
     geometry = posture.geometry
     assert np.abs(posture.crossings_m - geometry.crossings_m).max() > 0.005, "it has moved"
     for crossing, strands in enumerate(geometry.crossing_strands):
-        vertex = geometry.crossing_vertex[geometry.crossing_plane[crossing]]
+        point = POINTS_PER_SIDE * (geometry.crossing_plane[crossing] + 1)
         for strand in strands:
-            np.testing.assert_allclose(posture.strands_m[strand, vertex], posture.crossings_m[crossing], atol=1e-6)
+            np.testing.assert_allclose(posture.strands_m[strand, point], posture.crossings_m[crossing], atol=1e-6)
 
 
 def test_an_outline_visits_the_rhombus_corners_and_closes(rods_run: Run) -> None:
     posture = recorded_posture(rods_run, LATE_S)
-    per_side = rods_run.config.body.mesh.elements_per_side  # type: ignore[union-attr]
     for rhombus in (0, 17, len(posture.geometry.rhombi) - 1):
         line = rhombus_outline(posture, rhombus)
-        assert len(line) == 4 * per_side + 1
+        assert len(line) == 4 * POINTS_PER_SIDE + 1
         np.testing.assert_array_equal(line[0], line[-1])
-        np.testing.assert_array_equal(line[:-1:per_side], posture.crossings_m[posture.geometry.rhombi[rhombus]])
+        np.testing.assert_array_equal(line[:-1:POINTS_PER_SIDE], posture.crossings_m[posture.geometry.rhombi[rhombus]])
         steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
         assert steps.max() < 1.5 * steps.min(), "it follows the strands and does not jump"
 

@@ -217,6 +217,6 @@ def test_soft_crossings_have_a_bar_to_each_strand() -> None:
         worm = DrawnWorm(config)
         worm.pose(worm.model.qpos0)
         scene = mujoco.MjvScene(worm.model, maxgeom=1000)
-        worm.add_links(scene)
+        worm.complete(scene)
         assert scene.ngeom == n_links * config.body.geometry().n_crossings
         assert ("soft" in worm.legend()[-1][0]) == (n_links > 0)

@@ -35,13 +35,15 @@ if TYPE_CHECKING:
     from annelid.draw.plots import figure7, plot_path
     from annelid.draw.render import DEFAULT_CAMERA, render_frame, render_video
     from annelid.draw.scene import Skeleton, WormScene, postures_of, render_still
-    from annelid.draw.summary_table import UNKNOWN, aligned, comparison_table, fields_table, framed_table
+    from annelid.draw.strands import POINTS_PER_SIDE, strand_curves
+    from annelid.draw.summary_table import UNKNOWN, aligned, comparison_table, fields_table
 
 __all__ = [
     "CONTRACTED",
     "CONTRACTED_WIDTH",
     "DEFAULT_CAMERA",
     "PIN_RGBA",
+    "POINTS_PER_SIDE",
     "RUN_FIGURES",
     "SPRING_RGBA",
     "STRAND_RGBA",
@@ -59,7 +61,6 @@ __all__ = [
     "figure7",
     "find_backend",
     "fitting_distance",
-    "framed_table",
     "html_page",
     "lengths_figure",
     "line_looks",
@@ -77,6 +78,7 @@ __all__ = [
     "save",
     "save_both",
     "segment_colors",
+    "strand_curves",
     "travel_figure",
     "uncertainty_figure",
 ]
@@ -84,6 +86,7 @@ __all__ = [
 __getattr__, __dir__ = lazy(
     __name__,
     {
+        "framed_table": "make a rich.table.Table",
         "Mark": "progress_figure takes the values of the trials",
         "load_frame_figure": "annelid_lab.calibration draws loops of a load frame",
         "Panel": "uncertainty_figure takes the rows of uncertainty.csv",

@@ -18,6 +18,7 @@ from annelid.draw.canvas import CONTRACTED
 from annelid.draw.drawn_worm import DrawnRobot, DrawnWorm, dim, set_fog
 from annelid.draw.gl import find_backend
 from annelid.draw.overlay import BRIGHT, Overlay, background_of
+from annelid.draw.strands import StrandBodies
 from annelid.errors import RenderingUnavailable, RunFileError
 from annelid.protocols import Array
 from annelid.simulation.anatomy import Anatomy
@@ -96,7 +97,7 @@ class _Scene(AbstractContextManager):
         self._context.make_current()
         parts = mujoco.mjtCatBit.mjCAT_ALL.value
         mujoco.mjv_updateScene(worm.model, worm.posture, self._option, None, camera, parts, scene)
-        worm.add_links(scene)
+        worm.complete(scene)
         for eye in scene.camera:
             eye.pos = camera.lookat + (eye.pos - camera.lookat) @ worm.upright
             eye.forward, eye.up = eye.forward @ worm.upright, eye.up @ worm.upright
@@ -259,20 +260,13 @@ class Skeleton:
     def __init__(self, anatomy: Anatomy) -> None:
         self.anatomy = anatomy
         self._data = mujoco.MjData(anatomy.model)
-        mujoco.mj_kinematics(anatomy.model, self._data)
-        vertices = anatomy.geometry.vertices_m
-        self._shape = vertices.shape
-        self._body = _bodies_of_vertices(anatomy.model, *vertices.shape[:2])
-        # At rest the axes of all bodies are the world's.
-        self._place = vertices.reshape(-1, 3) - self._data.xpos[self._body]
+        self._strands = StrandBodies(anatomy.model, anatomy.geometry)
 
     def locate(self, qpos: NDArray[np.floating]) -> tuple[Array, Array]:
-        """Returns vertices of the strands from front to rear, m, ``(n_strands, n_vertices, 3)``, and the crossings."""
+        """Returns the curves of the strands, m, as `strand_curves`, and the crossings, ``(n_crossings, 3)``."""
         self._data.qpos[:] = qpos
         crossing, *_ = self.anatomy.locate(self._data)
-        turn = self._data.xmat[self._body].reshape(-1, 3, 3)
-        vertices = self._data.xpos[self._body] + np.einsum("vij,vj->vi", turn, self._place)
-        return vertices.reshape(self._shape), crossing
+        return self._strands.curves(self._data)[0], crossing
 
     def places(self, geoms: NDArray[np.int64]) -> tuple[Array, Array]:
         """Returns centres, m, ``(n, 3)``, and quaternions, ``(n, 4)``, of n geoms in the posture located last."""
@@ -280,19 +274,6 @@ class Skeleton:
         for turn, axes in zip(turns, self._data.geom_xmat[geoms], strict=True):
             mujoco.mju_mat2Quat(turn, axes)
         return self._data.geom_xpos[geoms], turns
-
-
-def _bodies_of_vertices(model: mujoco.MjModel, n_strands: int, n_vertices: int) -> NDArray[np.int64]:
-    """Body that carries each vertex, strand by strand: its own for rods, the element behind it for a chain."""
-    if model.nflex:
-        of_strand = []
-        for strand in range(n_strands):
-            flex = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_FLEX, f"strand_{strand}")
-            first, count = model.flex_vertadr[flex], model.flex_vertnum[flex]
-            of_strand.append(model.flex_vertbodyid[first : first + count])
-        return np.concatenate(of_strand).astype(np.int64)
-    elements = np.minimum(np.arange(n_vertices), n_vertices - 2)
-    return np.array([model.body(f"strand_{strand}_{e}").id for strand in range(n_strands) for e in elements])
 
 
 def _middle(points_m: Array) -> Array:

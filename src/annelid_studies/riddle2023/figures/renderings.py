@@ -18,6 +18,7 @@ from annelid.config import RunConfig
 from annelid.draw import (
     CONTRACTED,
     PIN_RGBA,
+    POINTS_PER_SIDE,
     STRAND_RGBA,
     VIEWS_DEG,
     Skeleton,
@@ -27,6 +28,7 @@ from annelid.draw import (
     postures_of,
     render_still,
     save_both,
+    strand_curves,
 )
 from annelid.errors import RenderingUnavailable
 from annelid.morphology import Array, MeshGeometry
@@ -49,7 +51,7 @@ class Posture:
     geometry: MeshGeometry  # Its mesh at rest
     time_s: float  # Time of the posture; NaN at rest
     crossings_m: Array  # Positions of the pins, m, shape ``(n_crossings, 3)``
-    strands_m: Array  # Points of the strands, m, shape ``(n_strands, n_vertices, 3)``
+    strands_m: Array  # Points of the strands' curves, m, shape ``(n_strands, n_points, 3)``
     qpos: Array | None = None  # The engine's coordinates; None at rest
     activation: Array | None = None  # Of every ring muscle; None where all are to be shown in red
 
@@ -61,7 +63,9 @@ def rest_posture(config: RunConfig) -> Posture:
         ConfigError: The worm is planar.
     """
     geometry = _mesh(config)
-    return Posture(config, geometry, float("nan"), geometry.crossings_m, geometry.vertices_m)
+    return Posture(
+        config, geometry, float("nan"), geometry.crossings_m, strand_curves(geometry.vertices_m, geometry)[0]
+    )
 
 
 def recorded_posture(run: Run, time_s: float) -> Posture:
@@ -122,7 +126,7 @@ def rhombus_outline(posture: Posture, rhombus: int) -> Array:
     for start, end in zip(corners, np.roll(corners, -1), strict=True):
         # The points of the strand that both share, from the one pin to just before the other.
         (strand,) = np.intersect1d(geometry.crossing_strands[start], geometry.crossing_strands[end])
-        first, last = (int(geometry.crossing_vertex[geometry.crossing_plane[c]]) for c in (start, end))
+        first, last = (POINTS_PER_SIDE * (int(geometry.crossing_plane[c]) + 1) for c in (start, end))
         step = 1 if last > first else -1
         points += [posture.crossings_m[[start]], posture.strands_m[strand, np.arange(first + step, last, step)]]
     return np.concatenate([*points, points[0]])

@@ -18,9 +18,7 @@ from annelid.draw.scene import WormScene
 from annelid.errors import MissingDependency, RunFileError
 from annelid.simulation.loop import simulate
 from annelid.simulation.runfile import Run
-from annelid_studies.riddle2023.figures.renderings import rendering_works
-
-needs_gl = pytest.mark.skipif(not rendering_works(), reason="no OpenGL back-end works on this machine")
+from opengl import needs_gl
 
 
 def reddish(pixels: np.ndarray) -> np.ndarray:

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from annelid.draw.page import html_page
     from annelid.draw.plots import figure7, plot_path
     from annelid.draw.render import DEFAULT_CAMERA, render_frame, render_video
-    from annelid.draw.scene import Skeleton, WormScene, postures_of, render_still
+    from annelid.draw.scene import Skeleton, WormScene, postures_of
     from annelid.draw.strands import POINTS_PER_SIDE, strand_curves
     from annelid.draw.summary_table import UNKNOWN, aligned, comparison_table, fields_table
 
@@ -73,7 +73,6 @@ __all__ = [
     "postures_of",
     "progress_figure",
     "render_frame",
-    "render_still",
     "render_video",
     "save",
     "save_both",
@@ -86,6 +85,7 @@ __all__ = [
 __getattr__, __dir__ = lazy(
     __name__,
     {
+        "render_still": "render_frame draws a run on white",
         "framed_table": "make a rich.table.Table",
         "Mark": "progress_figure takes the values of the trials",
         "load_frame_figure": "annelid_lab.calibration draws loops of a load frame",

@@ -172,16 +172,7 @@ def _draw_levels(axes: Axes, levels: list[float], looks: list[dict]) -> None:
 
 
 def _name_level(axes: Axes, level: float, text: str) -> None:
-    axes.annotate(
-        text,
-        (1.0, level),
-        xycoords=("axes fraction", "data"),
-        xytext=(3, 0),
-        textcoords="offset points",
-        va="center",
-        fontsize=7.0,
-        color="0.25",
-    )
+    axes.text(1.004, level, text, transform=axes.get_yaxis_transform(), va="center", fontsize=7.0, color="0.25")
 
 
 def _published_levels(run: Run) -> list[float]:

@@ -1,23 +1,21 @@
-"""A 3D worm drawn by MuJoCo: as a run recorded it, in postures that are given one by one, or once on white."""
+"""A 3D worm drawn by MuJoCo: as a run recorded it, or in postures that are given one by one."""
 
 from __future__ import annotations
 
 import math
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from annelid.config import RunConfig
-from annelid.draw.camera import FIELD_OF_VIEW_DEG, FIXED, fitting_distance, picture_points, view_angles
-from annelid.draw.canvas import CONTRACTED
+from annelid.draw.camera import FIELD_OF_VIEW_DEG, FIXED, fitting_distance, view_angles
 from annelid.draw.drawn_worm import DrawnRobot, DrawnWorm, dim, set_fog
 from annelid.draw.gl import find_backend
-from annelid.draw.overlay import BRIGHT, Overlay, background_of
+from annelid.draw.overlay import Overlay, background_of
 from annelid.draw.strands import StrandBodies
 from annelid.errors import RenderingUnavailable, RunFileError
 from annelid.protocols import Array
@@ -26,7 +24,6 @@ from annelid.simulation.runfile import Run
 
 ROOM = 1.3
 """A camera that cannot know what is to come keeps this many times the distance from which the worm at rest fits."""
-PALE = 3.0  # on white, what lies this many half worms behind its middle would vanish
 
 
 class _Scene(AbstractContextManager):
@@ -172,65 +169,6 @@ class PostureScene(_Scene):
     def picture(self, qpos: Array, activation: Array, caption: str) -> NDArray[np.uint8]:
         """Draws a posture, with activation ``(n_muscles,)``, as pixels of shape ``(height, width, 3)``."""
         return self._draw(qpos, activation, _middle(self._worm.part_ends(qpos)), caption)
-
-
-@dataclass(frozen=True)
-class Still:
-    """A rendered posture that marks can be drawn on."""
-
-    pixels: NDArray[np.uint8]  # (height, width, 3)
-    target_m: Array  # point that the camera looks at, (3,)
-    angles_deg: tuple[float, float]  # azimuth and elevation of the line of sight
-    distance_m: float  # from the camera to the point that it looks at
-    upright: Array  # the rotation from the model's axes to upright ones, (3, 3)
-
-    def places(self, points_m: ArrayLike) -> Array:
-        """Finds the pixels at which points, m, ``(..., 3)``, appear.
-
-        Returns:
-            Columns and rows, counted from the picture's upper left corner, shape ``(..., 2)``.
-        """
-        height, width = self.pixels.shape[:2]
-        offsets = (np.asarray(points_m, dtype=float) - self.target_m) @ self.upright.T
-        shares = picture_points(offsets, *self.angles_deg, self.distance_m, width / height)
-        return shares * [width, height] - 0.5
-
-
-def render_still(
-    config: RunConfig,
-    angles_deg: tuple[float, float],
-    size: tuple[int, int],
-    *,
-    qpos: Array | None = None,
-    activation: Array | None = None,
-) -> Still:
-    """Renders one posture on white, without a floor; what lies behind is paler.
-
-    Args:
-        config: Configuration of the 3D worm.
-        angles_deg: Azimuth and elevation of the line of sight.
-        size: Width and height, pixels.
-        qpos: The posture as a run records it; by default at rest.
-        activation: Colours and widths of the ring muscles; by default all rings and springs are red.
-
-    Raises:
-        RenderingUnavailable: No OpenGL back-end works.
-    """
-    worm = DrawnWorm(config)
-    model = worm.model
-    if activation is None:
-        model.tendon_rgba[:] = (*CONTRACTED, 1.0)
-    model.geom_rgba[model.geom_bodyid == 0, 3] = 0.0
-    model.vis.headlight.ambient[:] = BRIGHT
-    model.vis.rgba.fog[:] = 1.0
-    drawn = model.qpos0 if qpos is None else qpos
-    points = worm.part_ends(drawn)
-    target = _middle(points)
-    distance = fitting_distance((points - target) @ worm.upright.T, *angles_deg, size[0] / size[1])
-    reach = float(np.linalg.norm(points - target, axis=1).max())
-    set_fog(model, distance - reach, distance + PALE * reach)
-    with _Scene(worm, size, angles_deg, distance, fine=True, words=False) as scene:
-        return Still(scene._draw(drawn, activation, target), target, angles_deg, distance, worm.upright)
 
 
 def postures_of(run: Run, n_coordinates: int) -> NDArray[np.floating]:

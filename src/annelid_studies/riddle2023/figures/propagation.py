@@ -114,7 +114,7 @@ def figure_8_propagation(run: Run, stem: Path, time_s: float = TIME_S) -> str:
     with canvas(6.7) as figure:
         grid = figure.add_gridspec(2, 1)
         picture, below = figure.add_subfigure(grid[0]).subplots(), figure.add_subfigure(grid[1])
-        place = show_worm(picture, posture, FIGURE_8_DEG, WIDTH_IN)
+        place = show_worm(picture, posture, FIGURE_8_DEG)
         heights_in = min(_height_over_width(picture) * WIDTH_IN + 0.9, 4.3), 2.5
         grid.set_height_ratios(heights_in)
         figure.set_figheight(sum(heights_in))

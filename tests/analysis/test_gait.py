@@ -23,7 +23,8 @@ MASS_KG, LENGTH_M = 2.0, 0.5
 
 
 def run_of(data: xr.Dataset, **tree: Any) -> Run:
-    return Run(Path("run.nc"), data, check_config({"name": "riddle2023"} | tree), "complete", "")
+    config = check_config({"name": "riddle2023"} | tree)
+    return Run(Path("run.nc"), {}, {}, config, "complete", "").with_data(data)
 
 
 def walking(duration_s: float = 12.0, **signals: Any) -> xr.Dataset:

@@ -102,7 +102,7 @@ def make(names: Sequence[str], output: Path = IMAGES, kept: Path = KEPT) -> list
 
 def cases(picture: Picture) -> Mapping[str, Case]:
     """Returns the runs that a picture is drawn from: one, or that in every arena by the arena's name."""
-    if picture.maker not in ("frame", "figure7", "track", "video", "arenas"):
+    if picture.maker not in ("frame", "figure7", "track", "network", "video", "arenas"):
         return {}
     from typer.main import get_command
 
@@ -218,7 +218,7 @@ def makers() -> Mapping[str, Callable[[Job], Path]]:
     from annelid_studies.challenge import ranking, report
 
     return {
-        **dict.fromkeys(("frame", "figure7", "track", "video"), _of_run),
+        **dict.fromkeys(("frame", "figure7", "track", "network", "video"), _of_run),
         "arenas": _arenas,
         "sweep": _sweep,
         "command": _command,

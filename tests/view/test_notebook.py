@@ -19,7 +19,7 @@ from annelid.draw import gl
 from annelid.draw.notebook import Picture
 from annelid.errors import RenderingUnavailable, RunFileError
 from annelid.simulation.runfile import Run
-from annelid_studies.riddle2023.figures.renderings import rendering_works
+from opengl import rendering_works
 
 QUICK_START = Path(__file__).parents[2] / "docs" / "tutorials" / "quick_start.ipynb"
 

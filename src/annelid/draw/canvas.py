@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from matplotlib.lines import Line2D
 
 WIDTH_IN = 7.2  # width of a figure across a page, inches
+MOST_ROWS = 6
+"""Segments that get a panel; of more some that are evenly spaced."""
 STYLE: Any = {
     "font.family": "sans-serif",
     "font.sans-serif": ["DejaVu Sans"],
@@ -125,6 +127,11 @@ def segment_colors(n_segments: int) -> list[Any]:
 def line_looks(n_lines: int) -> list[dict[str, Any]]:
     """Returns colour and dashes of each of several lines, so that they differ in grey and for colour-blind readers."""
     return [{"color": c, "linestyle": d} for c, d in zip(segment_colors(n_lines), cycle(DASHES), strict=False)]
+
+
+def evenly(n: int, most: int) -> list[int]:
+    """Returns at most so many of n places from 0 on, the first and the last among them, evenly spaced."""
+    return np.unique(np.linspace(0, n - 1, min(n, most)).round().astype(int)).tolist()
 
 
 def activation_color(activation: float) -> tuple[float, float, float]:

@@ -17,6 +17,7 @@ from annelid.config import RunConfig
 from annelid.draw.camera import FIELD_OF_VIEW_DEG
 from annelid.draw.canvas import activation_color
 from annelid.draw.overlay import BRIGHT, DIM, Background, Entry, background_of
+from annelid.draw.strands import StrandBodies, strand_curves, tube_faces, tubes
 from annelid.protocols import Array
 from annelid.simulation.scene_objects import in_scene
 
@@ -34,6 +35,9 @@ LOOKS = "annelid/"
 """What the names of sky, light and floor begin with in a robot's model, as none of its file does."""
 WAYPOINT_RGBA = (0.20, 0.55, 0.42, 0.35)
 WAYPOINT_HALF_HEIGHT_M = 1e-3
+HIDDEN = 5
+"""Group of what the engine is not to draw."""
+_CAPSULE = mujoco.mjtGeom.mjGEOM_CAPSULE.value
 
 
 class DrawnWorm:
@@ -50,12 +54,16 @@ class DrawnWorm:
         for tendon in spec.tendons:
             tendon.rgba = SPRING_RGBA
         _mark_waypoints(spec, config)
+        geometry = body.geometry()
+        self._tube_m = body.strands.radius_m
+        _add_tubes(spec, strand_curves(geometry.vertices_m, geometry)[0], self._tube_m)
         self.model = model = spec.compile()
+        self._strands: StrandBodies | None = StrandBodies(model, geometry)
         self._has_waypoints = config.turning is not None and bool(config.turning.goals.points_m)
         # What is drawn of springs, cables and crossings must not hide the mesh of a small worm.
         radius_m = max(body.mesh.radii_m)
         model.tendon_width *= DRAWN_WIDTH * radius_m
-        self._balls = np.array([model.geom(crossing_site(i)).id for i in range(body.geometry().n_crossings)])
+        self._balls = np.array([model.geom(crossing_site(i)).id for i in range(geometry.n_crossings)])
         model.geom_rgba[self._balls] = self._behind.ball
         ball_m = model.geom_size[self._balls, 0]
         ball_m = np.minimum(ball_m, LARGEST_BALL * radius_m)
@@ -84,17 +92,21 @@ class DrawnWorm:
             self.model.tendon_rgba[ring] = (*activation_color(value), 1.0)
             self.model.tendon_width[ring] = width * (1.0 + (CONTRACTED_WIDTH - 1.0) * value)
 
-    def add_links(self, scene: mujoco.MjvScene) -> None:
-        """Adds a bar for each soft connection of a crossing, from one of its ends to the other."""
+    def complete(self, scene: mujoco.MjvScene) -> None:
+        """Bends the tubes of the strands, and adds a bar from end to end of each soft connection of a crossing."""
         model, posture = self.model, self.posture
+        if self._strands is not None:
+            # The skins of a scene's own bodies come first.
+            vertices, normals = tubes(*self._strands.curves(posture), self._tube_m)
+            scene.skinvert[-vertices.size :], scene.skinnormal[-vertices.size :] = vertices.ravel(), normals.ravel()
         radius_m = LINK * float(model.geom_size[self._balls, 0].min(initial=math.inf))
-        capsule, rgba = mujoco.mjtGeom.mjGEOM_CAPSULE.value, np.array(self._behind.ball, dtype=np.float32)
+        rgba = np.array(self._behind.ball, dtype=np.float32)
         turn = posture.xmat.reshape(-1, 3, 3)[self._links]
         for ends in posture.xpos[self._links] + (turn @ self._link_places[..., None])[..., 0]:
             if scene.ngeom < scene.maxgeom:
                 bar = scene.geoms[scene.ngeom]
-                mujoco.mjv_initGeom(bar, capsule, np.zeros(3), np.zeros(3), np.eye(3).ravel(), rgba)
-                mujoco.mjv_connector(bar, capsule, radius_m, *ends)
+                mujoco.mjv_initGeom(bar, _CAPSULE, np.zeros(3), np.zeros(3), np.eye(3).ravel(), rgba)
+                mujoco.mjv_connector(bar, _CAPSULE, radius_m, *ends)
                 scene.ngeom += 1
 
     def legend(self) -> list[Entry]:
@@ -115,7 +127,7 @@ class DrawnWorm:
         """
         model, posture = self.model, self.posture
         parts = np.flatnonzero((model.geom_bodyid > 0) & ~self._in_scene[model.geom_bodyid])
-        capsules = model.geom_type[parts] == mujoco.mjtGeom.mjGEOM_CAPSULE.value
+        capsules = model.geom_type[parts] == _CAPSULE
         half_lengths = np.where(capsules, model.geom_size[parts, 1], 0.0)
         posture.qpos[:] = qpos
         mujoco.mj_kinematics(model, posture)
@@ -150,6 +162,7 @@ class DrawnRobot(DrawnWorm):
             tendon.rgba = SPRING_RGBA if np.allclose(tendon.rgba, PLAIN_RGBA) else tendon.rgba
         self.model = model = spec.compile()
         self.posture = mujoco.MjData(model)
+        self._strands = None
         self._balls = np.zeros(0, dtype=np.int64)
         self._links, self._link_places = np.zeros((0, 2), dtype=np.int64), np.zeros((0, 2, 3))
         self._in_scene = model.body_weldid == 0
@@ -219,6 +232,22 @@ def _light(spec: mujoco.MjSpec, behind: Background, material: str = "floor") -> 
         light.type = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
         light.diffuse = [0.4] * 3
         light.specular = [0.1] * 3
+
+
+def _add_tubes(spec: mujoco.MjSpec, curves_m: Array, radius_m: float) -> None:
+    """Adds tubes in place of the elements of strands: two skins, whose vertices `DrawnWorm.complete` places."""
+    for part in (*spec.flexes, *spec.geoms):
+        name = part.name if isinstance(part, mujoco.MjsFlex) else part.parent.name
+        if name.startswith("strand_"):
+            part.group = HIDDEN
+    half, n_points, _ = curves_m[::2].shape
+    faces = tube_faces(half, n_points)
+    for number, rgba in enumerate(STRAND_RGBA):
+        skin = spec.add_skin(name=f"strands_{number}", rgba=rgba)
+        n_vertices = int(faces.max()) + 1
+        skin.vert, skin.face = np.zeros(3 * n_vertices).tolist(), faces.ravel().tolist()
+        skin.bodyname, skin.bindpos, skin.bindquat = ["world"], [0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]
+        skin.vertid, skin.vertweight = [list(range(n_vertices))], [[1.0] * n_vertices]
 
 
 def _mark_waypoints(spec: mujoco.MjSpec, config: RunConfig) -> None:

@@ -7,9 +7,6 @@ from itertools import pairwise
 from math import ceil
 from typing import TYPE_CHECKING, NamedTuple
 
-from rich import box
-from rich.table import Table
-
 from annelid.analysis.comparison import LACKING, Comparison, relative_difference
 from annelid.analysis.numbers import UNKNOWN, Value, three_digits
 from annelid.analysis.paper import (
@@ -76,31 +73,6 @@ class Row(NamedTuple):
     ours: str
     reference: str = ""
     deviation: str = ""
-
-
-def framed_table(*headings: str, title: str | None = None, caption: str | None = None, min_width: int = 0) -> Table:
-    """Returns an empty table in the project's look, whose long words go on in the next line.
-
-    Args:
-        headings: Of its columns.
-        title: Above it, bold.
-        caption: Below it.
-        min_width: Least width, characters.
-    """
-    table = Table(
-        *headings,
-        title=title,
-        title_justify="left",
-        title_style="bold",
-        caption=caption,
-        caption_justify="left",
-        box=box.SIMPLE_HEAD,
-        pad_edge=False,
-        min_width=min_width,
-    )
-    for column in table.columns:
-        column.overflow = "fold"
-    return table
 
 
 def aligned(rows: Sequence[Sequence[str]]) -> str:

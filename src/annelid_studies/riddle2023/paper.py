@@ -61,8 +61,7 @@ def reproduce(
         progress: Called as the work goes on.
 
     Returns:
-        The report, whose pictures are drawn: where there is no OpenGL, without those that are rendered, and its summary
-        says so.
+        The report, whose pictures are drawn.
 
     Raises:
         ConfigError: An examination has no such name.
@@ -87,18 +86,13 @@ def reproduce(
         series |= {f"{label}, mean of six": walked_elongation(store[variants[label]]).tolist() for label in _QUICK}
         pictures = folder / "figures"
         pictures.mkdir(parents=True, exist_ok=True)
-        drawn = list(FIGURES)
-        if not renderings.rendering_works():
-            drawn = [number for number in FIGURES if number not in RENDERED]
-            left_out = " and ".join(map(str, RENDERED))
-            summary.append(f"Figures {left_out} need OpenGL, which this machine lacks (`annelid doctor`).")
-        for i, number in enumerate(drawn):
+        for i, number in enumerate(FIGURES):
             if progress is not None:
-                progress("drawing", i, len(drawn), i / len(drawn))
+                progress("drawing", i, len(FIGURES), i / len(FIGURES))
             stem, title = pictures / f"figure_{number}", texts("figures/figures.toml")[str(number)]["title"]
             figures.append(Figure(number, title, stem.with_suffix(".png"), FIGURES[number](main, series, stem)))
         if progress is not None:
-            progress("drawing", len(drawn), len(drawn), 1.0)
+            progress("drawing", len(FIGURES), len(FIGURES), 1.0)
         evidence = Evidence(store, effort, {one.examination.name: one.findings for one in examined})
         claims, judging = paper_claims(evidence), rule(evidence)
     return Report(
@@ -152,8 +146,6 @@ FIGURES: Mapping[int, Callable[[Run, Series, Path], str]] = {
     9: lambda run, series, stem: robot_lengths.figure_9_robot_lengths(series, stem),
 }
 """What draws each figure and returns its caption."""
-RENDERED = (4, 8)
-"""Figures that need OpenGL."""
 
 
 def _variants_table(variants: Mapping[str, Outcome]) -> Table:

@@ -178,8 +178,7 @@ def similar_worm(
     if low >= high:
         raise ConfigError(f"n_helices = {n_helices}: neighbours lift a segment further than it lengthens; take more")
     fields["body.rings.peak_force_N"] = (force, "the base's share of what the mesh bears")
-    pulled = body.model_copy(update={"rings": body.rings.model_copy(update={"peak_force_N": force})})
-    steps = _steps(base, n_segments, slower, longest_step_s(pulled))
+    steps = _steps(base, n_segments, slower, longest_step_s(body, force))
     if rear_radius_m is not None:
         fields |= _tapered(body, force, ranges, rear_radius_m)
     fields["sensor.tolerance_m"] = ((low + high) / 2.0, f"middle of the window {1e3 * low:.2g} to {1e3 * high:.2g} mm")

@@ -69,8 +69,11 @@ def bearable_force_N(body: MeshBody, share: float = 1 / 3) -> float:
 def longest_step_s(body: MeshBody, force_N: float) -> float:
     """Returns the longest physics step in which muscles of a greatest force move their segments reliably, s.
 
-    It is in proportion to the root of a segment's mass times its ring's length over the force; the factor is measured
-    (`_MUSCLE_STEP`). Segments must be alike, as `WormBody.groups` makes them.
+    It is in proportion to the root of a segment's mass times its ring's length over the force; the factor is measured.
+
+    Args:
+        body: The worm; its segments must be alike, as `WormBody.groups` makes them.
+        force_N: Greatest force of a ring's muscle.
     """
     shape, mesh = rhombus_of(body), body.mesh
     strands = mesh.n_helices * mesh.planes_between_rings * shape.side_m

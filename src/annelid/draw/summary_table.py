@@ -145,12 +145,14 @@ def explained(row: str) -> list[tuple[str, str, str]]:
 def _rows(numbers: Summary, config: RunConfig, controller: str | None, *, everything: bool) -> dict[str, Row]:
     """Rows by the name of their number; those without any number are left out."""
     beside = references(config, controller)
+    ended_early = "" if numbers.status == "complete" else numbers.status.replace("_", " ")
+    doubts = ended_early, f"{len(numbers.warnings)}, below" if numbers.warnings else ""
     cells = {
         "order": ("order", _order(numbers)),
         "onsets (s)": ("onsets (s)", _onsets(numbers)),
         **{name: (one.heading, one.text(getattr(numbers, name))) for name, one in NUMBERS.items() if one.label},
         "work goes to (%)": ("work goes to (%)", _shares_of_the_work(numbers)),
-        "warnings": ("warnings", f"{len(numbers.warnings)}, below" if numbers.warnings else "none"),
+        "warnings": ("warnings", ", ".join(filter(None, doubts)) or "none"),
     }
     if numbers.speed_m_per_s is None and numbers.travel_m is not None:
         cells["speed_m_per_s"] = (NUMBERS["speed_m_per_s"].heading, _why_no_speed(numbers))

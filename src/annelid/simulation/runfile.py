@@ -299,7 +299,9 @@ def refuse_used_folder(out: Path, overwrite: bool) -> None:
         # A draft is left where a process was killed while it laid out its file.
         ours = LOCK_NAME, ".run.*.part.nc"
         if out.is_dir() and not overwrite and not all(any(map(entry.match, ours)) for entry in out.iterdir()):
-            raise ConfigError(f"the output folder {out} is not empty: name another, or allow overwriting")
+            raise ConfigError(
+                f"the output folder {out} is not empty: name another, or replace its run with --force (overwrite=True)"
+            )
     except OSError as error:
         raise RunFileError(f"cannot use the output folder {out}: {error.strerror}") from None
 
@@ -325,7 +327,9 @@ def examined_file(path: str | Path, *, whole: bool = False) -> tuple[Path, diges
         if state == "damaged":
             raise RunFileError(f"{file} is damaged: it is not as it was when the run ended")
         if not h5py.is_hdf5(file):
-            raise RunFileError(f"{file} is not an annelid run: it is not a netCDF-4 file")
+            made = f": annelid run {file} makes a run of a configuration, with --network of a network"
+            hint = made if file.suffix == ".toml" else ""
+            raise RunFileError(f"{file} is not an annelid run: it is not a netCDF-4 file{hint}")
         with h5py.File(file, "r") as content:
             # First, since a newer file may hold what the present schema does not.
             schema = _schema_of(content)

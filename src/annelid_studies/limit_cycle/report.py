@@ -22,7 +22,7 @@ def cycle_table(name: str, cycle: LimitCycle) -> Table:
     table.add_row("period (ms)", f"{1e3 * cycle.period_s:.2f}")
     for i, multiplier in enumerate(cycle.multipliers[:_MULTIPLIERS_SHOWN], start=1):
         table.add_row(f"multiplier {i}", _multiplier(multiplier))
-    table.add_row("orbit closes within", f"{cycle.closing_error:.0e} of a range")
+    table.add_row("orbit closes within", f"{cycle.closing_error:.0e} of a size")
     return table
 
 
@@ -30,7 +30,6 @@ def cycle_numbers(cycle: LimitCycle) -> dict[str, Any]:
     """Returns the same numbers for JSON: multipliers as pairs of real and imaginary part, times in s."""
     return {
         "period_s": cycle.period_s,
-        "timestep_s": cycle.timestep_s,
         "closing_error": cycle.closing_error,
         "multipliers": [[float(value.real), float(value.imag)] for value in cycle.multipliers],
         "trivial": cycle.trivial,

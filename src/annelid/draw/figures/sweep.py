@@ -133,10 +133,10 @@ def _is_number(coordinate: xr.DataArray) -> bool:
 
 
 def _quantity(values: xr.DataArray, where: str) -> str:
-    """Writes what numbers are, in words where their dataset has them, with their unit; in lines that fit there."""
-    unit, words = values.attrs["units"], values.attrs.get("long_name")
-    text = worded(str(values.name), unit) if words is None else f"{words}{'' if unit == '1' else f' ({unit})'}"
-    return "\n".join(wrap(text, _LETTERS[where]))
+    """Writes what numbers are called, with their unit, and what they are the mean of; in lines that fit there."""
+    return "\n".join(
+        wrap(worded(str(values.name), values.attrs["units"]) + values.attrs.get("of", ""), _LETTERS[where])
+    )
 
 
 def _label(coordinate: xr.DataArray) -> str:

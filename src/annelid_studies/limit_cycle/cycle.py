@@ -25,7 +25,7 @@ from annelid_studies.planar.riddle2022 import Riddle2022Plant
 MOST_STATES = 400
 """More states than this are refused: the derivatives of all by all would take too long."""
 _MOST_RETURNS = 40
-_CLOSED = 1e-7  # Closing error at which an orbit counts as closed, as a share of each state's range
+_CLOSED = 1e-7  # Closing error at which an orbit counts as closed, as a share of each state's size
 _LONGEST_CYCLE_S = 60.0
 _MS_PER_S = 1e3
 
@@ -41,7 +41,7 @@ class LimitCycle:
     Attributes:
         labels: Names of the states.
         period_s: Period, s.
-        closing_error: Largest distance between beginning and end in any state, as a share of its range.
+        closing_error: Largest distance between beginning and end in any state, as a share of its size.
         time_s: Instants, s, from 0 to the period, ``(n_phases + 1,)``.
         state: Shape ``(n_phases + 1, n_states)``.
         multipliers: Floquet multipliers, by falling magnitude, ``(n_states,)``, complex.
@@ -202,15 +202,14 @@ def find_limit_cycle(
                 f"{flow.labels[section.state]} does not rise through {section.threshold:g} within {longest_s:g} s: "
                 "choose another threshold or neuron, or a worm that oscillates"
             )
-        span = np.where(orbit.most > orbit.least, orbit.most - orbit.least, 1.0)
-        closing = float((np.abs(orbit.state - state) / span).max()) if returns else np.inf
+        closing = float((np.abs(orbit.state - state) / flow.scale).max()) if returns else np.inf
         state, on = orbit.state, orbit.on
         if closing <= _CLOSED:
             break
     else:
         raise NoLimitCycle(
             f"the orbit does not close: after {_MOST_RETURNS} returns to the section its ends differ by {closing:.2g} "
-            f"of a state's range, more than {_CLOSED:g}"
+            f"of a state's size, more than {_CLOSED:g}"
         )
     states, velocities, transitions = [state], [flow.velocity(state[np.newaxis], on)[0]], []
     for _ in range(n_phases):
@@ -220,7 +219,7 @@ def find_limit_cycle(
         velocities.append(flow.velocity(arc.state[np.newaxis], on)[0])
         transitions.append(arc.transition)
     monodromy = reduce(lambda product, transition: transition @ product, transitions)
-    multipliers, adjoint = _decomposed(monodromy, span)
+    multipliers, adjoint = _decomposed(monodromy, flow.scale)
     carried = accumulate(transitions[::-1], lambda later, transition: transition.T @ later, initial=adjoint)
     response = np.array([*carried][::-1])
     return LimitCycle(

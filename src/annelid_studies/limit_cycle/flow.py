@@ -55,8 +55,6 @@ class Journey:
         on: The switches there, ``(n_switches,)``.
         duration_s: How long it took, s.
         met: Whether it ended on the section.
-        least: Smallest value of each state on the way, ``(n_states,)``.
-        most: Largest value, likewise.
         transition: Derivatives of the end by the start, ``(n_states, n_states)``; the unit matrix if not asked for.
     """
 
@@ -64,8 +62,6 @@ class Journey:
     on: Switches
     duration_s: float
     met: bool
-    least: Array
-    most: Array
     transition: Array
 
 
@@ -114,7 +110,7 @@ def travel(
     y = np.append(state, np.eye(n)) if linearised else state
     scale = np.append(flow.scale, np.ones(n * n)) if linearised else flow.scale
     tolerance = _OF_DERIVATIVES if linearised else _TOLERANCE
-    time_s, met, least, most = 0.0, False, state, state
+    time_s, met = 0.0, False
     # Since it moved last, a switch may have passed its threshold by the rounding of a step.
     on = on ^ (flow.margins(state[np.newaxis], on)[0] < 0.0)
     while time_s < duration_s and not met:
@@ -129,7 +125,6 @@ def travel(
             max_step=_LONGEST_STEP_S,
         )
         time_s, y = float(leg.t[-1]), leg.y[:, -1]
-        least, most = np.minimum(least, leg.y[:n].min(axis=1)), np.maximum(most, leg.y[:n].max(axis=1))
         met = section is not None and bool(leg.t_events[1].size)
         if leg.t_events[0].size:
             here = y[:n]
@@ -143,4 +138,4 @@ def travel(
                 saltation = np.eye(n) + np.outer(jump, normal) / (normal @ before)
                 y = np.append(here, saltation @ y[n:].reshape(n, n))
     transition = y[n:].reshape(n, n) if linearised else np.eye(n)
-    return Journey(y[:n].copy(), on, time_s, met, least, most, transition)
+    return Journey(y[:n].copy(), on, time_s, met, transition)

@@ -22,7 +22,7 @@ def cycle_table(name: str, cycle: LimitCycle) -> Table:
     table.add_row("period (ms)", f"{1e3 * cycle.period_s:.2f}")
     for i, multiplier in enumerate(cycle.multipliers[:_MULTIPLIERS_SHOWN], start=1):
         table.add_row(f"multiplier {i}", _multiplier(multiplier))
-    table.add_row("orbit closes within", f"{cycle.closing_error:.0e} of a range")
+    table.add_row("orbit closes within", f"{cycle.closing_error:.0e} of a size")
     return table
 
 

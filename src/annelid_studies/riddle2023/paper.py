@@ -152,7 +152,9 @@ def _variants_table(variants: Mapping[str, Outcome]) -> Table:
     rows: dict[tuple[str, str], Callable[[Outcome], str]] = {
         ("order of onsets", "1-2-3"): order_of,
         ("period (s)", f"about {PAPER_PERIOD_S:g} (Fig. 7)"): lambda o: words.in_unit(o.rhythm.period_s, digits=3),
-        ("elongation, first helix, peak to peak (cm)", words.all_in_cm(PAPER_ELONGATION_M)): _helix,
+        ("elongation, first helix, peak to peak (cm)", words.all_in_cm(PAPER_ELONGATION_M)): (
+            lambda o: words.all_in_cm(walked_elongation(o, first_helix=True))
+        ),
         ("elongation, mean of six, maximum (cm)", ""): lambda o: words.all_in_cm(walked_elongation(o)),
         ("segment 2 below segment 1 (%)", words.in_percent(PAPER_MIDDLE_DEFICIT, 1)): (
             lambda o: words.in_percent(o.summary.middle_deficit, 1)
@@ -171,10 +173,6 @@ def _variants_table(variants: Mapping[str, Outcome]) -> Table:
     return Table(
         ["quantity", "paper", *variants], [[*head, *map(text, variants.values())] for head, text in rows.items()]
     )
-
-
-def _helix(outcome: Outcome) -> str:
-    return words.all_in_cm(walked_elongation(outcome, first_helix=True))
 
 
 def _beside_the_paper(main: Outcome) -> Table:

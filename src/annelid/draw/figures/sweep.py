@@ -108,12 +108,13 @@ def _map(figure: Figure, axes: Axes, data: xr.Dataset, fields: Sequence[str], na
 
 
 def _colors(values: np.ndarray) -> dict[str, Any]:
-    """The map of colours of numbers, and its range where they lie on both sides of zero."""
+    """The map of colours of numbers, and that its middle is zero where they lie on both sides of it."""
+    from matplotlib.colors import CenteredNorm
+
     known = values[np.isfinite(values)]
     if not known.size or known.min() >= 0.0 or known.max() <= 0.0:
         return {"cmap": COLORS}
-    reach = float(np.abs(known).max())
-    return {"cmap": SIGNED, "vmin": -reach, "vmax": reach}
+    return {"cmap": SIGNED, "norm": CenteredNorm()}
 
 
 def _places(axes: Axes, which: str, coordinate: xr.DataArray) -> np.ndarray:

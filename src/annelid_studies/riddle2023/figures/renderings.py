@@ -130,7 +130,7 @@ def show_worm(axes: Axes, posture: Posture, angles_deg: tuple[float, float]) -> 
     colors = np.repeat([color for _, color, _ in parts], counts, axis=0) * (1.0 - pale) + pale
     widths = np.repeat([width for *_, width in parts], counts)
     axes.add_collection(
-        LineCollection(place(ends[order]), colors=colors[order], linewidths=widths[order], capstyle="round")
+        LineCollection(list(place(ends[order])), colors=colors[order], linewidths=widths[order], capstyle="round")
     )
     axes.set_axis_off()
     axes.set_aspect("equal")

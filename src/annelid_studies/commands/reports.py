@@ -222,11 +222,11 @@ def challenge_command(
     trials.csv.
 
     \b
-    annelid study challenge --quick                                   in minutes
-    annelid study challenge                                           all entrants, tasks and bodies
-    annelid study challenge mine:Controller --task slope --draws 4    your own, against the reference
-    annelid study challenge mine.toml --with published/runs.csv       only yours is computed
-    annelid study challenge mine.toml --tune 48 -o tuned              tune yours as ours were
+    annelid study challenge --quick                             in minutes
+    annelid study challenge                                     everything
+    annelid study challenge mine:Controller --task slope        your own
+    annelid study challenge mine.toml --with published.csv      only yours runs
+    annelid study challenge mine.toml --tune 32 -o tuned        tune it first
     """
     from annelid_studies.challenge import report, tasks
     from annelid_studies.challenge.ranking import Pair, Standing, half_step_changes, pairs, standings

@@ -201,40 +201,23 @@ def _tapered(body: WormBody, force_N: float, range_m: list[float], rear_radius_m
     }
 
 
-def worm_text(
-    radius_m: float,
-    n_segments: int = 3,
-    n_helices: int = 12,
-    length_m: float | None = None,
-    rear_radius_m: float | None = None,
-    segment_length_m: float | None = None,
-    strand_radius_m: float | None = None,
-    young_modulus_Pa: float | None = None,
-) -> str:
-    """Returns `similar_worm` as TOML that ``annelid run`` takes, with the rule behind every number.
+def worm_text(fields: Fields) -> str:
+    """Returns the fields of a `similar_worm` as TOML that ``annelid run`` takes, with the rule behind every number.
 
     Raises:
-        ConfigError: As `similar_worm`, or its run would be refused, by the checks or by the engine.
+        ConfigError: Its run would be refused, by the checks or by the engine.
     """
-    fields = similar_worm(
-        radius_m,
-        n_segments,
-        n_helices,
-        length_m,
-        rear_radius_m,
-        segment_length_m,
-        strand_radius_m,
-        young_modulus_Pa,
-    )
     config = load_config(BASE, _values(fields))
     refuse_nonsense(config)
     compile_spec(build_spec(config))
+    mesh = worm_of(config).mesh
     tables: dict[str, list[str]] = {"": []}
     for path, (value, rule) in fields.items():
         table, _, name = path.rpartition(".")
         tables.setdefault(table, []).append(f"{f'{name} = {toml_value(value)}':<40}  # {rule}")
     heading = [
-        f"# A worm of radius {radius_m:g} m, {n_segments} segments and {n_helices} strands that moves as {BASE} does.",
+        f"# A worm of radius {mesh.radii_m[0]:g} m, {mesh.n_segments} segments and {mesh.n_helices} strands that moves "
+        f"as {BASE} does.",
         "# Numbers follow from the geometry by Froude similarity; the rule stands beside each. Replace what you can",
         "# measure on your robot. annelid check compares the numbers with one another.",
         f'extends = "{BASE}"',

@@ -121,7 +121,7 @@ def test_every_worm_passes_the_checks(
 
 
 def test_the_written_worm_is_the_computed_one(tmp_path: Path) -> None:
-    (tmp_path / "mine.toml").write_text(worm_text(0.05, 5, 8, 0.4))
+    (tmp_path / "mine.toml").write_text(worm_text(similar_worm(0.05, 5, 8, 0.4)))
     read = load_config(tmp_path / "mine.toml")
     assert read.name == "mine"
     assert read.model_dump(exclude={"name"}) == worm(0.05, 5, 8, 0.4).model_dump(exclude={"name"})
@@ -141,7 +141,7 @@ def test_a_geometry_that_cannot_work_is_refused(subtests: pytest.Subtests) -> No
         ((0.002,), "too small for the engine's numbers; .* must be at least 2.* times as large"),
     ):
         with subtests.test(f"{geometry!r:.60}"), pytest.raises(ConfigError, match=words):
-            worm_text(*geometry)  # type: ignore[arg-type]
+            worm_text(similar_worm(*geometry))  # type: ignore[arg-type]
 
 
 @pytest.mark.slow
@@ -156,7 +156,7 @@ def test_drawn_geometries_walk_in_order_at_first_try(tmp_path: Path, capsys: pyt
         length_m = share * mesh_length(worm(radius_m, n_segments, n_helices)) if rng.random() < 0.5 else None
         walks = False
         try:
-            worm_text(radius_m, n_segments, n_helices, length_m)
+            worm_text(similar_worm(radius_m, n_segments, n_helices, length_m))
             run = simulate(worm(radius_m, n_segments, n_helices, length_m), tmp_path / f"{draw}", progress=False)
             scores = rhythm_score(run), lengthening_score(run)
             walks, told = all(one.is_one_wave for one in scores), " / ".join(one.reason for one in scores)

@@ -51,12 +51,13 @@ def new_command(
     from annelid.config import load_config
     from annelid.output import write_text
     from annelid.plausibility import refuse_nonsense
-    from annelid_lab.scaled_worm import worm_text
+    from annelid_lab.scaled_worm import similar_worm, worm_text
 
     if path.suffix != ".toml":
         raise typer.BadParameter(f"{path} must end in .toml")
     refuse_existing(path, force, "")
-    text = worm_text(radius, segments, helices, length, rear_radius, segment_length, strand_radius, young_modulus)
+    fields = similar_worm(radius, segments, helices, length, rear_radius, segment_length, strand_radius, young_modulus)
+    text = worm_text(fields)
     print_paths([write_text(path, text)])
     for doubt in refuse_nonsense(load_config(path)):
         complain(f"warning: {doubt}")

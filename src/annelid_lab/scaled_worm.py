@@ -24,7 +24,7 @@ from annelid.body import (
 from annelid.config import RunConfig, check_section, load_config, toml_value
 from annelid.errors import ConfigError, require_finite, require_positive
 from annelid.morphology import rhombus
-from annelid.plausibility import refuse_nonsense, tolerance_window_m
+from annelid.plausibility import refuse_nonsense
 
 BASE = "riddle2023-rods"
 """The preset that new worms are similar to."""
@@ -171,7 +171,8 @@ def similar_worm(
     }
     # What follows from the whole mesh. The window was measured at the base's damping, which a similar worm's is.
     similar = load_config(BASE, _values(fields) | {"body.strands.damping_time_s": strands.damping_time_s})
-    body, window = worm_of(similar), tolerance_window_m(similar)
+    body = worm_of(similar)
+    window = body.tolerance_window_m(arena.friction)
     assert window is not None
     force = rings.forces(1)[0] * bearable_force_N(body) / bearable_force_N(known)
     low, high = window
@@ -202,7 +203,7 @@ def _tapered(body: WormBody, force_N: float, range_m: list[float], rear_radius_m
 
 
 def worm_text(fields: Fields) -> str:
-    """Returns the fields of a `similar_worm` as TOML that ``annelid run`` takes, with the rule behind every number.
+    """Returns a worm of `similar_worm` as TOML that ``annelid run`` takes, with the rule behind every number.
 
     Raises:
         ConfigError: Its run would be refused, by the checks or by the engine.
@@ -210,14 +211,14 @@ def worm_text(fields: Fields) -> str:
     config = load_config(BASE, _values(fields))
     refuse_nonsense(config)
     compile_spec(build_spec(config))
-    mesh = worm_of(config).mesh
     tables: dict[str, list[str]] = {"": []}
     for path, (value, rule) in fields.items():
         table, _, name = path.rpartition(".")
         tables.setdefault(table, []).append(f"{f'{name} = {toml_value(value)}':<40}  # {rule}")
+    mesh = worm_of(config).mesh
+    shape = f"radius {mesh.radii_m[0]:g} m, {mesh.n_segments} segments and {mesh.n_helices} strands"
     heading = [
-        f"# A worm of radius {mesh.radii_m[0]:g} m, {mesh.n_segments} segments and {mesh.n_helices} strands that moves "
-        f"as {BASE} does.",
+        f"# A worm of {shape} that moves as {BASE} does.",
         "# Numbers follow from the geometry by Froude similarity; the rule stands beside each. Replace what you can",
         "# measure on your robot. annelid check compares the numbers with one another.",
         f'extends = "{BASE}"',

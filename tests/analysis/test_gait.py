@@ -179,12 +179,6 @@ def test_a_planar_worm_s_balance_needs_no_weight() -> None:
     assert balance.energy_numerical_J == pytest.approx(0.0, abs=1e-12)
 
 
-def test_names_of_before_say_where_their_numbers_are() -> None:
-    for name, now in (("period_s", "gait_period_s"), ("energy", "energy_muscle_work_J")):
-        with pytest.raises(AttributeError, match=now):
-            getattr(Gait(), name)
-
-
 @pytest.mark.parametrize("duration_s", [0.0, 1.0, 3.0])
 def test_a_run_too_short_for_a_gait_tells_none_of_it(duration_s: float) -> None:
     read = gait(run_of(walking(duration_s)))

@@ -17,9 +17,10 @@ from annelid.body.assemble import MOST_ORDERED_BODIES
 from annelid.body.worm import WormBody
 from annelid.config import RunConfig, load_config
 from annelid.errors import AnnelidError, ConfigError
-from annelid.plausibility import check, tolerance_window_m
+from annelid.plausibility import check
 from annelid.simulation.loop import simulate
 from annelid_lab.scaled_worm import BASE, LARGEST_ANGLE_RAD, similar_worm, worm_text
+from rods import tolerance_window_m
 
 RADII_M, SEGMENTS, HELICES = (0.02, 0.4), (3, 20), (6, 8, 10, 12, 14, 16)
 

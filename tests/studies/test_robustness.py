@@ -11,9 +11,9 @@ import pytest
 
 from annelid.analysis.rhythm import RhythmScore
 from annelid.errors import ConfigError
-from annelid.plausibility import tolerance_window_m
 from annelid_studies import robustness as study
 from annelid_studies.robustness import CONTROLLERS, Judged, judge, points, shares
+from rods import tolerance_window_m
 
 pytestmark = pytest.mark.usefixtures("runs_in_this_process")
 

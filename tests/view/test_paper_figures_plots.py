@@ -168,7 +168,7 @@ def test_long_names_are_shortened_and_explained() -> None:
     for name in ("left", "half_centre_1", "half_centre_2"):
         network.add_neuron(name, Neuron())
     assert labels_of(network) == {"left": "left", "half_centre_1": "hal", "half_centre_2": "hal"}
-    assert meanings_of(network) == ["hal: half_centre"]
+    assert meanings_of(network) == {"hal": "half_centre"}
 
 
 # Figure 9

@@ -7,7 +7,6 @@ docs/evidence/gait.md has the definitions with their formulae and sources.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -67,14 +66,6 @@ class Gait:
         "turning radius",
         "m",
     )
-
-    if not TYPE_CHECKING:
-
-        def __getattr__(self, name: str) -> Any:
-            """Says where numbers of before are now."""
-            now = {"period_s": "gait_period_s", "energy": "energy_muscle_work_J and others of annelid.summary(run)"}
-            hint = f": it is now {now[name]}" if name in now else ""
-            raise AttributeError(f"{type(self).__name__} has no {name}{hint}")
 
 
 def gait(run: Run) -> Gait:

@@ -44,14 +44,6 @@ STYLE: Any = {
     "figure.facecolor": "white",
 }
 
-# What differs on a dark page.
-_LIGHT = "#e8eaed"
-_DARK = {
-    **{f"{side}.facecolor": "#14161a" for side in ("figure", "axes", "savefig")},
-    **dict.fromkeys(("text.color", "axes.labelcolor", "xtick.color", "ytick.color", "axes.edgecolor"), _LIGHT),
-    "grid.color": "#33383f",
-}
-
 # Dark to light, so that the order of segments survives greyscale; hues far apart for colour-blind eyes.
 _FEW = ("#1b2a6b", "#c2410c", "#35b5a0", "#e3b428")
 RELAXED = (0.46, 0.49, 0.54)
@@ -71,11 +63,11 @@ def canvas(height_in: float, width_in: float = WIDTH_IN, *, dark: bool = False) 
         width_in: Width, inches.
         dark: Light words on a dark page.
     """
-    import matplotlib
+    from matplotlib import style
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    with matplotlib.rc_context(STYLE | (_DARK if dark else {})):
+    with style.context([STYLE, *(["dark_background", {"grid.color": "0.25"}] if dark else [])]):
         figure = Figure(figsize=(width_in, height_in), layout="constrained")
         FigureCanvasAgg(figure)
         yield figure

@@ -129,7 +129,7 @@ class WormScene(_Scene):
         self.times_s: Array = run.data["frame_time"].values
         self._qpos = postures_of(run, worm.model.nq)
         self._activation = run.data["activation"]
-        points = np.stack([worm.part_ends(qpos) for qpos in self._qpos])
+        points = np.stack([worm.outline(qpos) for qpos in self._qpos])
         box_middle = (points.min(axis=(0, 1)) + points.max(axis=(0, 1))) / 2
         seen = run.data["crossing_position"].values if "crossing_position" in run.data else points
         self._target = seen.mean(axis=1)
@@ -160,7 +160,7 @@ class PostureScene(_Scene):
     def __init__(self, config: RunConfig, width: int, height: int, camera: str) -> None:
         angles = view_angles(camera)
         worm = DrawnWorm(config)
-        points = worm.part_ends(worm.model.qpos0)
+        points = worm.outline(worm.model.qpos0)
         offsets = (points - _middle(points)) @ worm.upright.T
         distance = ROOM * fitting_distance(offsets, *angles, width / height)
         dim(worm.model, angles[1])
@@ -168,7 +168,7 @@ class PostureScene(_Scene):
 
     def picture(self, qpos: Array, activation: Array, caption: str) -> NDArray[np.uint8]:
         """Draws a posture, with activation ``(n_muscles,)``, as pixels of shape ``(height, width, 3)``."""
-        return self._draw(qpos, activation, _middle(self._worm.part_ends(qpos)), caption)
+        return self._draw(qpos, activation, _middle(self._worm.outline(qpos)), caption)
 
 
 def postures_of(run: Run, n_coordinates: int) -> NDArray[np.floating]:

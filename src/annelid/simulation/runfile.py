@@ -93,10 +93,9 @@ class Run:
 
     def with_data(self, data: xarray.Dataset) -> Run:
         """Returns the run with other data, such as some samples of its own."""
-        parts = ((str(name), tuple(map(str, one.dims)), one) for name, one in data.variables.items())
-        return replace(
-            self, variables={name: Recorded(dims, one.values, one.attrs) for name, dims, one in parts}, attrs=data.attrs
-        )
+        parts: Any = data.variables
+        variables = {name: Recorded(one.dims, one.values, one.attrs) for name, one in parts.items()}
+        return replace(self, variables=variables, attrs=data.attrs)
 
     def __repr__(self) -> str:
         time = self.variables["time"].values

@@ -56,8 +56,7 @@ def new_command(
     if path.suffix != ".toml":
         raise typer.BadParameter(f"{path} must end in .toml")
     refuse_existing(path, force, "")
-    fields = similar_worm(radius, segments, helices, length, rear_radius, segment_length, strand_radius, young_modulus)
-    text = worm_text(fields)
-    print_paths([write_text(path, text)])
+    own = similar_worm(radius, segments, helices, length, rear_radius, segment_length, strand_radius, young_modulus)
+    print_paths([write_text(path, worm_text(own))])
     for doubt in refuse_nonsense(load_config(path)):
         complain(f"warning: {doubt}")

@@ -169,15 +169,10 @@ def labels_of(network: Network) -> dict[str, str]:
     return {name: shown[role_of(name)] if numbered else name for name in network.neurons}
 
 
-def meanings_of(network: Network) -> list[str]:
-    """Returns what labels stand for, ``"U1: contraction"``, of those that are not the names themselves."""
-    return list(
-        dict.fromkeys(
-            f"{label}: {role_of(name)}"
-            for name, label in labels_of(network).items()
-            if label not in (name, role_of(name))
-        )
-    )
+def meanings_of(network: Network) -> dict[str, str]:
+    """Returns what labels stand for, as U1 for contraction, of those that are not the names themselves."""
+    roles = {label: role_of(name) for name, label in labels_of(network).items() if label != name}
+    return {label: role for label, role in roles.items() if label != role}
 
 
 def looks_of(network: Network) -> dict[str, dict[str, Any]]:
@@ -399,14 +394,14 @@ def _draw_key(figure: Figure, network: Network, traces: Iterable[str]) -> None:
     """
     from matplotlib.lines import Line2D
 
-    meanings = {text.partition(":")[0]: text for text in meanings_of(network)}
-    traces = dict.fromkeys(traces)
+    meanings, traces = meanings_of(network), set(traces)
     ring: dict[str, Any] = {"marker": "o", "markerfacecolor": "white", "markersize": 9, "markeredgewidth": 2}
     entries = []
     for label, look in looks_of(network).items():
         if label in meanings or label in traces:
             line = look if label in traces else {"linestyle": "none", "markeredgecolor": look["color"]}
-            entries.append(Line2D([], [], label=plain(meanings.get(label, label)), **ring, **line))
+            name = f"{label}: {meanings[label]}" if label in meanings else label
+            entries.append(Line2D([], [], label=plain(name), **ring, **line))
     if any(neuron.channels for neuron in network.neurons.values()):
         gated = {"marker": "$\u25ce$", "markersize": 11, "color": _INK, "linestyle": "none"}
         entries.append(Line2D([], [], label="neuron with gated channels", **gated))

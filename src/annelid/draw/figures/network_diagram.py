@@ -121,8 +121,7 @@ def run_network_figure(run: Run, path: str | Path) -> Path:
         looks, labels = looks_of(network), labels_of(network)
         for axes, (name, row) in zip(panels, rows.items(), strict=True):
             for neuron in row:
-                trace = run.data["potential"].values[:, neurons.index(neuron)]
-                gid = f"trace-{neurons.index(neuron)}"
+                trace, gid = run.data["potential"].sel(neuron=neuron).values, f"trace-{neurons.index(neuron)}"
                 axes.plot(run.data["time"].values, trace, **looks[labels[neuron]], gid=gid)
             axes.set(ylabel=name, xlim=run.data["time"].values[[0, -1]])
         if rows:
@@ -317,12 +316,7 @@ def _draw_columns(axes: Axes, network: Network, places: dict[str, complex]) -> N
         x, y = (part([places[name] for name in names]) for part in (np.real, np.imag))
         width, height = np.ptp(x) + 0.88, np.ptp(y) + 0.88
         corner = (x.min() - 0.44, y.min() - 0.44)
-        look: dict[str, Any] = {
-            "boxstyle": "round,pad=0,rounding_size=0.2",
-            "facecolor": "#f1f1f1",
-            "edgecolor": "none",
-        }
-        axes.add_patch(FancyBboxPatch(corner, width, height, **look))
+        axes.add_patch(FancyBboxPatch(corner, width, height, "round,pad=0,rounding_size=0.2", color="#f1f1f1"))
         axes.text(x.mean(), y.max() + _RADIUS + _STUB + 0.1, f"segment {segment}", ha="center", va="bottom", **_PAPER)
 
 

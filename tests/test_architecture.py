@@ -8,7 +8,6 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
 from graphlib import CycleError, TopologicalSorter
 from importlib import import_module
 from pathlib import Path
@@ -17,6 +16,7 @@ import pytest
 
 import annelid
 from annelid.config.kinds import Kind, every_kind
+from imports import imported
 
 SOURCE = Path(annelid.__file__).parent
 BASE = {"errors", "lazy", "markdown", "protocols", "clock", "text", "terminal", "textfiles", "output", "registry"}
@@ -70,28 +70,6 @@ NUMPY_ONLY = {"morphology", "nervous", "protocols"}
 def room_of(module: Path) -> str:
     relative = module.relative_to(SOURCE)
     return relative.parts[0].removesuffix(".py")
-
-
-def executed(node: ast.AST) -> Iterator[ast.AST]:
-    """All parts of a module that run some time, so not what stands there for type checkers only."""
-    for part in ast.iter_child_nodes(node):
-        if isinstance(part, ast.If) and isinstance(part.test, ast.Name) and part.test.id == "TYPE_CHECKING":
-            continue
-        yield part
-        yield from executed(part)
-
-
-def imported(module: Path) -> set[str]:
-    """Full names of all that a module imports, wherever the statement stands; what only types need does not count."""
-    names: set[str] = set()
-    for node in executed(ast.parse(module.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Import):
-            names |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, f"{module}: relative import"
-            base = node.module or ""
-            names |= {f"{base}.{alias.name}" if base == "annelid" else base for alias in node.names}
-    return names
 
 
 MODULES = [path for path in sorted(SOURCE.rglob("*.py")) if path.parent != SOURCE or "__" not in path.name]
@@ -219,7 +197,19 @@ def test_simulating_needs_neither_opengl_nor_matplotlib_nor_torch() -> None:
 
 
 def test_a_run_comes_to_its_table_without_what_only_pictures_and_studies_need(tmp_path: Path) -> None:
-    barred = ("OpenGL", "imageio", "markdown_it", "matplotlib", "optuna", "scipy", "tomlkit", "torch", "viser")
+    barred = (
+        "OpenGL",
+        "imageio",
+        "markdown_it",
+        "matplotlib",
+        "optuna",
+        "pandas",
+        "scipy",
+        "tomlkit",
+        "torch",
+        "viser",
+        "xarray",
+    )
     program = (
         f"import sys; sys.modules.update(dict.fromkeys({barred}))\n"
         "import annelid.draw.gallery as gallery; gallery.draw_all = lambda *_, **__: ()\n"

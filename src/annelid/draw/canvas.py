@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from matplotlib.lines import Line2D
 
 WIDTH_IN = 7.2  # width of a figure across a page, inches
+MOST_ROWS = 6
+"""Segments that get a panel; of more some that are evenly spaced."""
 STYLE: Any = {
     "font.family": "sans-serif",
     "font.sans-serif": ["DejaVu Sans"],
@@ -42,14 +44,6 @@ STYLE: Any = {
     "figure.facecolor": "white",
 }
 
-# What differs on a dark page.
-_LIGHT = "#e8eaed"
-_DARK = {
-    **{f"{side}.facecolor": "#14161a" for side in ("figure", "axes", "savefig")},
-    **dict.fromkeys(("text.color", "axes.labelcolor", "xtick.color", "ytick.color", "axes.edgecolor"), _LIGHT),
-    "grid.color": "#33383f",
-}
-
 # Dark to light, so that the order of segments survives greyscale; hues far apart for colour-blind eyes.
 _FEW = ("#1b2a6b", "#c2410c", "#35b5a0", "#e3b428")
 RELAXED = (0.46, 0.49, 0.54)
@@ -69,11 +63,11 @@ def canvas(height_in: float, width_in: float = WIDTH_IN, *, dark: bool = False) 
         width_in: Width, inches.
         dark: Light words on a dark page.
     """
-    import matplotlib
+    from matplotlib import style
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    with matplotlib.rc_context(STYLE | (_DARK if dark else {})):
+    with style.context([STYLE, *(["dark_background", {"grid.color": "0.25"}] if dark else [])]):
         figure = Figure(figsize=(width_in, height_in), layout="constrained")
         FigureCanvasAgg(figure)
         yield figure
@@ -127,6 +121,11 @@ def line_looks(n_lines: int) -> list[dict[str, Any]]:
     return [{"color": c, "linestyle": d} for c, d in zip(segment_colors(n_lines), cycle(DASHES), strict=False)]
 
 
+def evenly(n: int, most: int) -> list[int]:
+    """Returns at most so many of n places from 0 on, the first and the last among them, evenly spaced."""
+    return np.unique(np.linspace(0, n - 1, min(n, most)).round().astype(int)).tolist()
+
+
 def activation_color(activation: float) -> tuple[float, float, float]:
     """Mixes the colour of a ring muscle from its activation, in [0, 1]: grey at rest, red when contracted."""
     share = min(max(activation, 0.0), 1.0)
@@ -160,19 +159,15 @@ def line_entries(entries: Iterable[tuple[Any, Any, float, str]]) -> list[Line2D]
     return [Line2D([], [], color=c, linestyle=s, linewidth=w, label=plain(text)) for c, s, w, text in entries]
 
 
-def draw_lines(
-    axes: Axes, lines: Mapping[str, tuple[ArrayLike, ArrayLike]], *, markers: bool = True, **style: Any
-) -> None:
+def draw_lines(axes: Axes, lines: Mapping[str, tuple[ArrayLike, ArrayLike]], **style: Any) -> None:
     """Draws numbers over a parameter, ``(n,)`` each; crosses on the lower edge mark where one is NaN.
 
     Args:
         axes: Where to draw.
         lines: Values of the parameter and numbers, by the name in the legend; each with colour, dashes and marker.
-        markers: Whether the lines have markers.
         **style: Further properties of the lines, as matplotlib takes them.
     """
-    shapes = cycle(MARKERS if markers else [""])
-    for (name, (x, y)), look, marker in zip(lines.items(), line_looks(len(lines)), shapes, strict=False):
+    for (name, (x, y)), look, marker in zip(lines.items(), line_looks(len(lines)), cycle(MARKERS), strict=False):
         place, value = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
         axes.plot(place, value, **{**look, "marker": marker, "label": plain(name), **style})
         mark_lost(axes, place[np.isnan(value)], look["color"])

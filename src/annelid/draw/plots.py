@@ -10,11 +10,10 @@ import numpy as np
 from annelid.analysis.paper import changed_fields, published
 from annelid.analysis.rhythm import CONTRACTED, segment_activation, stretches
 from annelid.config.fidelity import RESOLUTION
-from annelid.draw.canvas import canvas, line_entries, line_looks, panel_title, plain, save
+from annelid.draw.canvas import canvas, evenly, line_entries, line_looks, panel_title, plain, save
 from annelid.draw.figures import RUN_FIGURES
 from annelid.errors import RunFileError
 from annelid.output import with_suffix
-from annelid.protocols import Array
 from annelid.simulation.runfile import Run
 
 if TYPE_CHECKING:
@@ -75,31 +74,24 @@ def plot_path(path: str | Path) -> Path:
     return with_suffix(path, PLOT_SUFFIXES, "a figure", default=".png")
 
 
-def neuron_potentials(run: Run, role: str) -> dict[int, Array]:
-    """Returns the potential of each segment's neuron of a role, mV, ``(n_times,)``, by the segment (from 1)."""
-    if "potential" not in run.data:
-        return {}
-    names = [str(name) for name in run.data["neuron"].values]
-    traces = dict(zip(names, run.data["potential"].values.T, strict=True))
-    segments = range(1, run.config.body.n_segments + 1)
-    return {segment: traces[f"{role}_{segment}"] for segment in segments if f"{role}_{segment}" in traces}
-
-
 def _potentials(axes: Axes, run: Run, looks: list[dict]) -> None:
     axes.set_ylabel("membrane potential\nabove rest (mV)")
-    widths = {"contraction": _THICK, "expansion": _THIN}
-    halves = {role: found for role in widths if (found := neuron_potentials(run, role))}
     if "potential" not in run.data or not run.data.sizes["neuron"]:
         panel_title(axes, "Neurons")
         axes.text(0.5, 0.5, "no neurons recorded", transform=axes.transAxes, ha="center", color="0.4")
-    elif not halves:
+        return
+    traces, widths = run.data["potential"], {"contraction": _THICK, "expansion": _THIN}
+    names, drawn = set(traces["neuron"].values), []
+    for role, width in widths.items():
+        for segment, look in enumerate(looks, start=1):
+            if (name := f"{role}_{segment}") in names:
+                axes.plot(run.data["time"].values, traces.sel(neuron=name).values, **look, linewidth=width)
+                drawn.append(role)
+    if not drawn:
         _all_potentials(axes, run)
-    else:
-        panel_title(axes, "Half-centres")
-        for role, traces in halves.items():
-            for segment, trace in traces.items():
-                axes.plot(run.data["time"].values, trace, **looks[segment - 1], linewidth=widths[role])
-        _legend(axes, [("0.25", "-", widths[role], f"{role} neuron") for role in halves])
+        return
+    panel_title(axes, "Half-centres")
+    _legend(axes, [("0.25", "-", widths[role], f"{role} neuron") for role in dict.fromkeys(drawn)])
 
 
 def _all_potentials(axes: Axes, run: Run) -> None:
@@ -172,16 +164,7 @@ def _draw_levels(axes: Axes, levels: list[float], looks: list[dict]) -> None:
 
 
 def _name_level(axes: Axes, level: float, text: str) -> None:
-    axes.annotate(
-        text,
-        (1.0, level),
-        xycoords=("axes fraction", "data"),
-        xytext=(3, 0),
-        textcoords="offset points",
-        va="center",
-        fontsize=7.0,
-        color="0.25",
-    )
+    axes.text(1.004, level, text, transform=axes.get_yaxis_transform(), va="center", fontsize=7.0, color="0.25")
 
 
 def _published_levels(run: Run) -> list[float]:
@@ -202,9 +185,7 @@ def _published_levels(run: Run) -> list[float]:
 
 def _name_segments(figure: Figure, looks: list[dict], title: str) -> None:
     """Puts a title and a legend of the segments above all panels: every one, or evenly spaced ones of many."""
-    n = len(looks)
-    named = np.unique(np.linspace(0, n - 1, min(n, _MOST_NAMED)).round().astype(int)).tolist()
-    entries = [(*looks[i].values(), _THICK, f"segment {i + 1}") for i in named]
+    entries = [(*looks[i].values(), _THICK, f"segment {i + 1}") for i in evenly(len(looks), _MOST_NAMED)]
     figure.legend(
         handles=line_entries(entries),
         loc="outside upper left",

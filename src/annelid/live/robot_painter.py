@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from annelid.config import RunConfig
 from annelid.draw.drawn_worm import DrawnRobot
+from annelid.draw.scene import geom_places
 from annelid.live.history import Moment
 from annelid.live.lines_and_arrows import Colors, Lines, Picture, ring_colors, spring_colors
 from annelid.morphology import Array
@@ -45,17 +46,17 @@ class RobotPainter:
         self._corners = max(map(len, self._lines))
         self._n_segments = config.body.n_segments
         self._moving = np.flatnonzero(model.body_weldid > 0)
-        self.radius_m = float(np.ptp(self._drawn.part_ends(first.qpos), axis=0).max()) / 10
+        self.radius_m = float(np.ptp(self._drawn.outline(first.qpos), axis=0).max()) / 10
         weight_N = float(model.body_mass[self._moving].sum() * np.linalg.norm(model.opt.gravity))
         self.arrow_N = float(f"{2.0 * weight_N / self._n_segments:.1g}") if weight_N > 0 else 1.0
 
     def strand_colors(self) -> Colors:
         """Colours of what is not seen: lines without length, to which the camera is fitted."""
-        return np.zeros((len(self._drawn.part_ends(self.model.qpos0)), 2, 3), dtype=np.uint8)
+        return np.zeros((len(self._drawn.outline(self.model.qpos0)), 2, 3), dtype=np.uint8)
 
     def paint(self, moment: Moment) -> Picture:
         """Draws one moment."""
-        points = self._drawn.part_ends(moment.qpos).astype(np.float32)
+        points = self._drawn.outline(moment.qpos).astype(np.float32)
         rings = np.array([self._filled(ends) for ends in self._lines])
         middles = rings.mean(axis=(1, 2)).reshape(self._n_segments, -1, 3).mean(axis=1)
         arrows = np.stack([middles, middles + self.radius_m * moment.contact_force_N / self.arrow_N], axis=1)
@@ -71,11 +72,8 @@ class RobotPainter:
         )
 
     def places(self, geoms: NDArray[np.int64]) -> tuple[Array, Array]:
-        """Returns where geoms are in the moment painted last: centres, m, ``(n, 3)``, and quaternions, ``(n, 4)``."""
-        turns = np.zeros((len(geoms), 4))
-        for turn, matrix in zip(turns, self._drawn.posture.geom_xmat[geoms], strict=True):
-            mujoco.mju_mat2Quat(turn, matrix)
-        return self._drawn.posture.geom_xpos[geoms], turns
+        """Returns where geoms are in the moment painted last, as `geom_places`."""
+        return geom_places(self._drawn.posture, geoms)
 
     def _ends(self, actuator: int) -> list[tuple[_End, _End]]:
         """The lines of an actuator: through the sites of its tendon, between its sites, or from its joint."""

@@ -48,7 +48,7 @@ def paper_command(
 
     Writes report.html, one file with all pictures, and report.md with its figures. It takes about an hour on two cores,
     with --quick about six minutes. Every run is kept in report/runs, so a second call continues where the first was
-    stopped. Without OpenGL the report leaves out figures 4 and 8, and says so.
+    stopped.
 
     \b
     annelid study paper                              into the folder report

@@ -8,7 +8,6 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
 from graphlib import CycleError, TopologicalSorter
 from importlib import import_module
 from pathlib import Path
@@ -17,6 +16,7 @@ import pytest
 
 import annelid
 from annelid.config.kinds import Kind, every_kind
+from imports import imported
 
 SOURCE = Path(annelid.__file__).parent
 BASE = {"errors", "lazy", "markdown", "protocols", "clock", "text", "terminal", "textfiles", "output", "registry"}
@@ -70,28 +70,6 @@ NUMPY_ONLY = {"morphology", "nervous", "protocols"}
 def room_of(module: Path) -> str:
     relative = module.relative_to(SOURCE)
     return relative.parts[0].removesuffix(".py")
-
-
-def executed(node: ast.AST) -> Iterator[ast.AST]:
-    """All parts of a module that run some time, so not what stands there for type checkers only."""
-    for part in ast.iter_child_nodes(node):
-        if isinstance(part, ast.If) and isinstance(part.test, ast.Name) and part.test.id == "TYPE_CHECKING":
-            continue
-        yield part
-        yield from executed(part)
-
-
-def imported(module: Path) -> set[str]:
-    """Full names of all that a module imports, wherever the statement stands; what only types need does not count."""
-    names: set[str] = set()
-    for node in executed(ast.parse(module.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Import):
-            names |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, f"{module}: relative import"
-            base = node.module or ""
-            names |= {f"{base}.{alias.name}" if base == "annelid" else base for alias in node.names}
-    return names
 
 
 MODULES = [path for path in sorted(SOURCE.rglob("*.py")) if path.parent != SOURCE or "__" not in path.name]

@@ -211,7 +211,7 @@ def detector_figure(detections: Mapping[str, Detection], stem: Path) -> Path:
         found = {name: precision_recall([one], LIMITS_M_PER_S) for name, one in detections.items()}
         # Where nothing is reported there is no precision.
         curves = {name: (recall[known := np.isfinite(of)], of[known]) for name, (recall, of) in found.items()}
-        draw_lines(axes, curves, markers=False, linewidth=1.1)
+        draw_lines(axes, curves, marker="", linewidth=1.1)
         chosen: dict[str, Any] = {"marker": "o", "markersize": 7, "color": "black", "linestyle": "none"}
         axes.plot(together.recall, together.precision, label="all runs, default threshold", **chosen)
         axes.set(xlim=(0.0, 1.0), ylim=(0.0, 1.02), xlabel="recall", ylabel="precision")

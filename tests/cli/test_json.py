@@ -87,7 +87,7 @@ def robustness(annelid: Command, finished: Path, monkeypatch: pytest.MonkeyPatch
 
 def calibrate(annelid: Command, finished: Path, monkeypatch: pytest.MonkeyPatch) -> Outcome:
     report = "annelid_lab.calibration.report"
-    monkeypatch.setattr(f"{report}.identify", lambda *_: SimpleNamespace(intervals=SimpleNamespace(confused=())))
+    monkeypatch.setattr(f"{report}.identify", lambda *_: SimpleNamespace(warnings=()))
     monkeypatch.setattr(f"{report}.write_identified", lambda _, folder: [folder / "calibrated.toml"])
     monkeypatch.setattr(f"{report}.tables", lambda _: [])
     return annelid("calibrate", "--json")

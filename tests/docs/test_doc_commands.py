@@ -71,6 +71,8 @@ LONG = {
     ("annelid", "study", "challenge"): ("hours, or minutes with --quick", ("--quick",)),
     ("annelid", "study", "robustness"): ("hours for 300 points", ("--points", "1")),
     ("annelid", "tune"): ("an hour", ("--trials", "2", "--duration", "1")),
+    ("annelid", "calibrate", "mine/study.toml"): ("some minutes", ("--free", "young_modulus")),
+    ("annelid", "calibrate", "twin/study.toml"): ("some minutes", ("--free", "young_modulus")),
     ("annelid", "calibrate"): ("some minutes", ("--free", "dry_friction", "--free", "cable_friction")),
     ("annelid", "study", "limit-cycle"): ("ten seconds of one core", ()),
     ("annelid", "study", "weak-middle"): ("minutes", ("--quick",)),
@@ -107,6 +109,7 @@ ELSEWHERE = {
     ("annelid", "export", "my_robot.xml"): "the same",
     ("annelid", "run", "tune/best.toml"): "the file is what a search found",
     ("annelid", "run", "mine/calibrated.toml"): "the file is what a fit found",
+    ("annelid", "run", "twin/calibrated.toml"): "the same",
     ("annelid", "draw", "course", "--time"): "its run is that of the page's example, which takes minutes",
     ("annelid", "draw", "course", "--video", "course.mp4", "--camera", "course"): "evidence/turning.md executes it",
 }

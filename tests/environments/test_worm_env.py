@@ -18,7 +18,7 @@ from annelid.body.worm import WormBody
 from annelid.environments import ENVIRONMENTS, WormEnv
 from annelid.environments.task import WEIGHTS
 from annelid.errors import AnnelidError, ConfigError, MissingDependency
-from annelid_studies.riddle2023.figures.renderings import rendering_works
+from opengl import needs_gl
 
 TERMS = ("reward_progress", "reward_effort", "reward_slip", "reward_success", "reward_failure")
 
@@ -238,7 +238,7 @@ def test_without_gymnasium_the_line_that_installs_it_is_named(monkeypatch: pytes
         importlib.import_module("annelid.environments")
 
 
-@pytest.mark.skipif(not rendering_works(), reason="no OpenGL back-end works on this machine")
+@needs_gl
 def test_a_picture_shows_the_worm_as_it_is_now() -> None:
     env = WormEnv(**CHEAP, render_mode="rgb_array", width=96, height=64)
     pictures = []

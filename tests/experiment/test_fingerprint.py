@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,23 +15,11 @@ from annelid.experiment.case import Case
 from annelid.experiment.fingerprint import PHYSICS, READERS, code_fingerprint, room_of, run_key
 from annelid_lab.calibration.base import Experiment
 from annelid_studies.standard_cases import PLANAR, RODS
+from imports import imported
 
 SOURCE = Path(annelid.__file__).parent.parent
 NO_RESULT = ("annelid.lazy", "annelid.markdown", "annelid.terminal", "annelid.experiment.fingerprint")
 """What is also imported, and no number depends on: how public names are loaded, tables, the progress bar, digests."""
-
-
-def imported(path: Path) -> Iterator[str]:
-    """Names of annelid's modules that a file imports, wherever the statement stands, but for type checkers."""
-    tree = ast.parse(path.read_bytes())
-    for node in ast.walk(tree):
-        if isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING":
-            node.body = []
-    for node in ast.walk(tree):
-        names = [alias.name for alias in node.names] if isinstance(node, ast.Import | ast.ImportFrom) else []
-        if isinstance(node, ast.ImportFrom) and node.module is not None:
-            names = [f"annelid.{name}" for name in names] if node.module == "annelid" else [node.module]
-        yield from (name for name in names if name.startswith("annelid"))
 
 
 def test_a_key_covers_all_that_its_code_imports() -> None:
@@ -43,7 +30,8 @@ def test_a_key_covers_all_that_its_code_imports() -> None:
     for room in (*PHYSICS, *kinds, *READERS):
         covered = (*PHYSICS, *NO_RESULT, room, *(READERS if room in READERS else ()))
         for path in fingerprint._files(room):
-            beside = [name for name in imported(path) if not f"{name}.".startswith(tuple(f"{one}." for one in covered))]
+            own = [name for name in imported(path) if name.startswith("annelid")]
+            beside = [name for name in own if not f"{name}.".startswith(tuple(f"{one}." for one in covered))]
             assert not beside, f"{path} imports {beside}, which are no part of the key"
 
 

@@ -159,19 +159,15 @@ def line_entries(entries: Iterable[tuple[Any, Any, float, str]]) -> list[Line2D]
     return [Line2D([], [], color=c, linestyle=s, linewidth=w, label=plain(text)) for c, s, w, text in entries]
 
 
-def draw_lines(
-    axes: Axes, lines: Mapping[str, tuple[ArrayLike, ArrayLike]], *, markers: bool = True, **style: Any
-) -> None:
+def draw_lines(axes: Axes, lines: Mapping[str, tuple[ArrayLike, ArrayLike]], **style: Any) -> None:
     """Draws numbers over a parameter, ``(n,)`` each; crosses on the lower edge mark where one is NaN.
 
     Args:
         axes: Where to draw.
         lines: Values of the parameter and numbers, by the name in the legend; each with colour, dashes and marker.
-        markers: Whether the lines have markers.
         **style: Further properties of the lines, as matplotlib takes them.
     """
-    shapes = cycle(MARKERS if markers else [""])
-    for (name, (x, y)), look, marker in zip(lines.items(), line_looks(len(lines)), shapes, strict=False):
+    for (name, (x, y)), look, marker in zip(lines.items(), line_looks(len(lines)), cycle(MARKERS), strict=False):
         place, value = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
         axes.plot(place, value, **{**look, "marker": marker, "label": plain(name), **style})
         mark_lost(axes, place[np.isnan(value)], look["color"])

@@ -182,11 +182,6 @@ def dim(model: mujoco.MjModel, elevation_deg: float) -> None:
         model.vis.headlight.ambient[:] = min(DIM, DIM + 0.1 - HEADLIGHT * steepness)
 
 
-def set_fog(model: mujoco.MjModel, start_m: float, end_m: float) -> None:
-    """Lets the haze begin and be full at distances from the camera, m."""
-    model.vis.map.fogstart, model.vis.map.fogend = start_m / model.stat.extent, end_m / model.stat.extent
-
-
 def _light(spec: mujoco.MjSpec, behind: Background, material: str = "floor") -> None:
     """Gives a model a picture's lens and light, and floor and sky the colours of the background."""
     visual = spec.visual

@@ -14,7 +14,6 @@ from annelid.draw.canvas import canvas, evenly, line_entries, line_looks, panel_
 from annelid.draw.figures import RUN_FIGURES
 from annelid.errors import RunFileError
 from annelid.output import with_suffix
-from annelid.protocols import Array
 from annelid.simulation.runfile import Run
 
 if TYPE_CHECKING:
@@ -75,31 +74,24 @@ def plot_path(path: str | Path) -> Path:
     return with_suffix(path, PLOT_SUFFIXES, "a figure", default=".png")
 
 
-def neuron_potentials(run: Run, role: str) -> dict[int, Array]:
-    """Returns the potential of each segment's neuron of a role, mV, ``(n_times,)``, by the segment (from 1)."""
-    if "potential" not in run.data:
-        return {}
-    names = [str(name) for name in run.data["neuron"].values]
-    traces = dict(zip(names, run.data["potential"].values.T, strict=True))
-    segments = range(1, run.config.body.n_segments + 1)
-    return {segment: traces[f"{role}_{segment}"] for segment in segments if f"{role}_{segment}" in traces}
-
-
 def _potentials(axes: Axes, run: Run, looks: list[dict]) -> None:
     axes.set_ylabel("membrane potential\nabove rest (mV)")
-    widths = {"contraction": _THICK, "expansion": _THIN}
-    halves = {role: found for role in widths if (found := neuron_potentials(run, role))}
     if "potential" not in run.data or not run.data.sizes["neuron"]:
         panel_title(axes, "Neurons")
         axes.text(0.5, 0.5, "no neurons recorded", transform=axes.transAxes, ha="center", color="0.4")
-    elif not halves:
+        return
+    traces, widths = run.data["potential"], {"contraction": _THICK, "expansion": _THIN}
+    names, drawn = set(traces["neuron"].values), []
+    for role, width in widths.items():
+        for segment, look in enumerate(looks, start=1):
+            if (name := f"{role}_{segment}") in names:
+                axes.plot(run.data["time"].values, traces.sel(neuron=name).values, **look, linewidth=width)
+                drawn.append(role)
+    if not drawn:
         _all_potentials(axes, run)
-    else:
-        panel_title(axes, "Half-centres")
-        for role, traces in halves.items():
-            for segment, trace in traces.items():
-                axes.plot(run.data["time"].values, trace, **looks[segment - 1], linewidth=widths[role])
-        _legend(axes, [("0.25", "-", widths[role], f"{role} neuron") for role in halves])
+        return
+    panel_title(axes, "Half-centres")
+    _legend(axes, [("0.25", "-", widths[role], f"{role} neuron") for role in dict.fromkeys(drawn)])
 
 
 def _all_potentials(axes: Axes, run: Run) -> None:

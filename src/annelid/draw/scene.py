@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from annelid.config import RunConfig
 from annelid.draw.camera import FIELD_OF_VIEW_DEG, FIXED, fitting_distance, view_angles
-from annelid.draw.drawn_worm import DrawnRobot, DrawnWorm, dim, set_fog
+from annelid.draw.drawn_worm import DrawnRobot, DrawnWorm, dim
 from annelid.draw.gl import find_backend
 from annelid.draw.overlay import Overlay, background_of
 from annelid.draw.strands import StrandBodies
@@ -27,7 +27,9 @@ ROOM = 1.3
 
 
 class _Scene(AbstractContextManager):
-    """Off-screen pictures of a worm from one direction and distance, whose model's off-screen size is set here.
+    """Off-screen pictures of a worm from a named view, at the distance from which all of some points are seen.
+
+    The points are offsets from what the camera looks at, m, ``(n, 3)``; it keeps ``room`` times their distance.
 
     Unlike `mujoco.Renderer`, whose back-end is fixed when `mujoco` is first imported, it takes the back-end that
     `find_backend` chose. Smooth edges (``fine``) cost twice the time where software draws.
@@ -37,14 +39,21 @@ class _Scene(AbstractContextManager):
         self,
         worm: DrawnWorm,
         size: tuple[int, int],
-        angles_deg: tuple[float, float],
-        distance_m: float,
+        camera: str,
+        offsets_m: Array,
         *,
         fine: bool,
         background: str = "floor",
         words: bool = True,
+        room: float = 1.0,
     ) -> None:
+        angles_deg = view_angles(camera)
+        distance_m = room * fitting_distance(offsets_m @ worm.upright.T, *angles_deg, size[0] / size[1])
         backend, model = find_backend(), worm.model
+        dim(model, angles_deg[1])
+        if camera in FIXED:
+            fog = model.vis.map
+            fog.fogstart, fog.fogend = 2.0 * distance_m / model.stat.extent, 6.0 * distance_m / model.stat.extent
         model.vis.global_.offwidth, model.vis.global_.offheight = size
         model.vis.quality.offsamples = 4 if fine else 0
         self._worm, self._size = worm, size
@@ -123,26 +132,19 @@ class WormScene(_Scene):
         background: str = "floor",
         words: bool = True,
     ) -> None:
-        body = run.config.body
-        angles = view_angles(camera)
-        worm = (DrawnWorm if body.own_model is None else DrawnRobot)(run.config, background)
+        worm = (DrawnWorm if run.config.body.own_model is None else DrawnRobot)(run.config, background)
         self.times_s: Array = run.data["frame_time"].values
         self._qpos = postures_of(run, worm.model.nq)
         self._activation = run.data["activation"]
         points = np.stack([worm.outline(qpos) for qpos in self._qpos])
-        box_middle = (points.min(axis=(0, 1)) + points.max(axis=(0, 1))) / 2
+        box_middle = _middle(points.reshape(-1, 3))
         seen = run.data["crossing_position"].values if "crossing_position" in run.data else points
         self._target = seen.mean(axis=1)
         self._target[:, 2] = box_middle[2]
         if camera in FIXED:
             self._target[:] = box_middle
-        offsets = (points - self._target[:, None]).reshape(-1, 3) @ worm.upright.T
-        distance = fitting_distance(offsets, *angles, width / height)
-        dim(worm.model, angles[1])
-        if camera in FIXED:
-            set_fog(worm.model, 2.0 * distance, 6.0 * distance)
-        look: dict[str, Any] = {"background": background, "words": words}
-        super().__init__(worm, (width, height), angles, distance, fine=fine, **look)
+        offsets = (points - self._target[:, None]).reshape(-1, 3)
+        super().__init__(worm, (width, height), camera, offsets, fine=fine, background=background, words=words)
 
     def picture(self, frame: int) -> NDArray[np.uint8]:
         """Draws one recorded frame, as pixels of shape ``(height, width, 3)``."""
@@ -158,13 +160,9 @@ class PostureScene(_Scene):
     """
 
     def __init__(self, config: RunConfig, width: int, height: int, camera: str) -> None:
-        angles = view_angles(camera)
         worm = DrawnWorm(config)
         points = worm.outline(worm.model.qpos0)
-        offsets = (points - _middle(points)) @ worm.upright.T
-        distance = ROOM * fitting_distance(offsets, *angles, width / height)
-        dim(worm.model, angles[1])
-        super().__init__(worm, (width, height), angles, distance, fine=False)
+        super().__init__(worm, (width, height), camera, points - _middle(points), fine=False, room=ROOM)
 
     def picture(self, qpos: Array, activation: Array, caption: str) -> NDArray[np.uint8]:
         """Draws a posture, with activation ``(n_muscles,)``, as pixels of shape ``(height, width, 3)``."""
@@ -193,25 +191,26 @@ def postures_of(run: Run, n_coordinates: int) -> NDArray[np.floating]:
 
 
 class Skeleton:
-    """Where strands and crossings of a compiled worm are in a posture, with an engine state of its own."""
+    """Where strands and crossings of a compiled worm are in a posture, with an engine state of its own: ``data``."""
 
     def __init__(self, anatomy: Anatomy) -> None:
         self.anatomy = anatomy
-        self._data = mujoco.MjData(anatomy.model)
+        self.data = mujoco.MjData(anatomy.model)
         self._strands = StrandBodies(anatomy.model, anatomy.geometry)
 
     def locate(self, qpos: NDArray[np.floating]) -> tuple[Array, Array]:
         """Returns the curves of the strands, m, as `strand_curves`, and the crossings, ``(n_crossings, 3)``."""
-        self._data.qpos[:] = qpos
-        crossing, *_ = self.anatomy.locate(self._data)
-        return self._strands.curves(self._data)[0], crossing
+        self.data.qpos[:] = qpos
+        crossing, *_ = self.anatomy.locate(self.data)
+        return self._strands.curves(self.data)[0], crossing
 
-    def places(self, geoms: NDArray[np.int64]) -> tuple[Array, Array]:
-        """Returns centres, m, ``(n, 3)``, and quaternions, ``(n, 4)``, of n geoms in the posture located last."""
-        turns = np.empty((len(geoms), 4))
-        for turn, axes in zip(turns, self._data.geom_xmat[geoms], strict=True):
-            mujoco.mju_mat2Quat(turn, axes)
-        return self._data.geom_xpos[geoms], turns
+
+def geom_places(data: mujoco.MjData, geoms: NDArray[np.int64]) -> tuple[Array, Array]:
+    """Returns centres, m, ``(n, 3)``, and quaternions, ``(n, 4)``, of n geoms."""
+    turns = np.empty((len(geoms), 4))
+    for turn, axes in zip(turns, data.geom_xmat[geoms], strict=True):
+        mujoco.mju_mat2Quat(turn, axes)
+    return data.geom_xpos[geoms], turns
 
 
 def _middle(points_m: Array) -> Array:

@@ -11,7 +11,7 @@ from annelid.arena.geoms import SCENE
 from annelid.body.formulations.rods.net import STRAND_RGBA
 from annelid.config import RunConfig
 from annelid.draw.canvas import CONTRACTED, RELAXED
-from annelid.draw.scene import Skeleton
+from annelid.draw.scene import Skeleton, geom_places
 from annelid.live.history import Moment
 from annelid.morphology import Array
 from annelid.simulation.anatomy import Anatomy
@@ -83,18 +83,18 @@ class Painter:
         springs = crossing[self._geometry.springs]
         length = np.linalg.norm(springs[:, 1] - springs[:, 0], axis=-1)
         return Picture(
-            strands=self._lines(np.stack([curves[:, :-1], curves[:, 1:]], axis=2).reshape(-1, 2, 3)),
-            rings=self._lines(crossing[self._ring_pairs]),
+            strands=_rounded(np.stack([curves[:, :-1], curves[:, 1:]], axis=2).reshape(-1, 2, 3), self._grain_m),
+            rings=_rounded(crossing[self._ring_pairs], self._grain_m),
             ring_colors=ring_colors(moment.activation, self._corners),
-            springs=self._lines(springs),
+            springs=_rounded(springs, self._grain_m),
             spring_colors=spring_colors(length / self._geometry.spring_length_m - 1.0),
             contacts=self._arrows(moment.contact_force_N, crossing),
             middle=crossing.mean(axis=0),
         )
 
     def places(self, geoms: NDArray[np.int64]) -> tuple[Array, Array]:
-        """Returns where geoms are in the moment painted last: centres, m, ``(n, 3)``, and quaternions, ``(n, 4)``."""
-        return self._skeleton.places(geoms)
+        """Returns where geoms are in the moment painted last, as `geom_places`."""
+        return geom_places(self._skeleton.data, geoms)
 
     def _arrows(self, force_N: NDArray[np.floating], crossing: Array) -> Lines:
         """Arrows from the crossing of each ring that lies farthest against the force."""
@@ -106,11 +106,7 @@ class Painter:
         length = np.linalg.norm(reach, axis=-1, keepdims=True)
         longest = LONGEST_ARROW * self._geometry.radius_m
         reach = reach * np.minimum(1.0, longest / np.maximum(length, longest * 1e-9))
-        return self._lines(np.stack([foot, foot + reach], axis=1))
-
-    def _lines(self, points_m: Array) -> Lines:
-        lines = points_m.astype(np.float32)
-        return (np.round(lines / self._grain_m) * self._grain_m).astype(np.float32) if self._grain_m else lines
+        return _rounded(np.stack([foot, foot + reach], axis=1), self._grain_m)
 
 
 class PlanarPainter:
@@ -142,7 +138,7 @@ class PlanarPainter:
         """Draws one moment."""
         corners = np.insert(moment.qpos.astype(float), 1, 0.0, axis=-1)
         sides = np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2, 3)
-        lines = (np.round(sides / self._grain_m) * self._grain_m if self._grain_m else sides).astype(np.float32)
+        lines = _rounded(sides, self._grain_m)
         foot = corners[np.arange(len(corners)), corners[..., 2].argmin(axis=1)]
         arrows = np.stack([foot, foot + self.radius_m * moment.contact_force_N / self.arrow_N], axis=1)
         # A body without springs still has a line for each, of no length.
@@ -179,6 +175,11 @@ def hit_point(points_m: Array, origin_m: Array, direction: Array) -> Array | Non
     beside = np.linalg.norm(offsets - depth[:, np.newaxis] * direction, axis=-1)
     hit = np.flatnonzero((beside < REACH_M) & (depth > 0))
     return points_m[hit[depth[hit].argmin()]] if hit.size else None
+
+
+def _rounded(points_m: Array, grain_m: float) -> Lines:
+    lines = points_m.astype(np.float32)
+    return (np.round(lines / grain_m) * grain_m).astype(np.float32) if grain_m else lines
 
 
 def _bytes(colors: NDArray[np.floating]) -> Colors:

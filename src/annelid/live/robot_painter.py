@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from annelid.config import RunConfig
 from annelid.draw.drawn_worm import DrawnRobot
+from annelid.draw.scene import geom_places
 from annelid.live.history import Moment
 from annelid.live.lines_and_arrows import Colors, Lines, Picture, ring_colors, spring_colors
 from annelid.morphology import Array
@@ -71,11 +72,8 @@ class RobotPainter:
         )
 
     def places(self, geoms: NDArray[np.int64]) -> tuple[Array, Array]:
-        """Returns where geoms are in the moment painted last: centres, m, ``(n, 3)``, and quaternions, ``(n, 4)``."""
-        turns = np.zeros((len(geoms), 4))
-        for turn, matrix in zip(turns, self._drawn.posture.geom_xmat[geoms], strict=True):
-            mujoco.mju_mat2Quat(turn, matrix)
-        return self._drawn.posture.geom_xpos[geoms], turns
+        """Returns where geoms are in the moment painted last, as `geom_places`."""
+        return geom_places(self._drawn.posture, geoms)
 
     def _ends(self, actuator: int) -> list[tuple[_End, _End]]:
         """The lines of an actuator: through the sites of its tendon, between its sites, or from its joint."""

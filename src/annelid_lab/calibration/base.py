@@ -21,6 +21,10 @@ Found = Mapping[str, Array]
 """Arrays that a test of a worm gives, by name."""
 FEWEST = 8
 """Points that an experiment must have."""
+OFF_SCALE = 20.0
+"""Data that are so many times as large or as small as the worm's have another unit than their columns say."""
+UNITS = {"Pa": ((1e9, "GPa"), (1e6, "MPa")), "m": ((1e-3, "mm"),)}
+"""Units in which results are shown, the largest that fits, by SI unit."""
 
 
 class Test(Protocol):
@@ -89,9 +93,26 @@ class Experiment(Kind):
     def predicted(self, config: RunConfig, data: Data, found: Found) -> Array:
         """Predicts the points, ``(n,)``, from what the test of the worm gave."""
 
+    def refuse_unlike(self, data: Data, found: Found, predicted: Array) -> None:
+        """Refuses data that the worm which a fit starts from misses by orders of magnitude."""
+        sizes = [float(np.abs(values).max()) for values in (data.values, predicted)]
+        if min(sizes) > 0 and not 1 / OFF_SCALE < sizes[0] / sizes[1] < OFF_SCALE:
+            raise ConfigError(
+                f"the data of experiments.{self.name} reach {sizes[0]:.3g} {data.unit}, the worm that the fit starts "
+                f"from {sizes[1]:.3g} {data.unit}: is a unit wrong?"
+            )
+
     def numbers(self, data: Data, found: Found) -> dict[str, float]:
         """Returns further numbers of a fit, by name."""
         return {}
+
+    def noise_floor(self, data: Data) -> Array | None:
+        """Standard deviation of the noise of each point, ``(n,)``, as far as it is known without a fit."""
+        return None if self.noise_sd is None else np.full(len(data.at), self.noise_sd)
+
+    def doubts(self, data: Data, found: Found) -> list[str]:
+        """Says what is wrong with the data, a sentence each, and what to measure instead."""
+        return []
 
 
 def file_beside(folder: Path, given: str, what: str) -> Path:
@@ -137,3 +158,11 @@ def binned(at: Array, values: Array, n: int) -> tuple[Array, Array]:
     means, _, _ = binned_statistic(at, [at, values], bins=n)
     means = means[:, np.isfinite(means[0])]
     return means[0], means[1]
+
+
+def shown_in(unit: str, size: float) -> tuple[float, str]:
+    """Returns by what values in an SI unit are divided to be shown, and a space and the unit; nothing for "1"."""
+    for factor, name in UNITS.get(unit, ()):
+        if size >= 0.1 * factor or (factor, name) == UNITS[unit][-1]:
+            return factor, f" {name}"
+    return 1.0, "" if unit == "1" else f" {unit}"

@@ -23,7 +23,7 @@ def identify_figure(fit: Fit, known: Intervals, stem: str | Path) -> Path:
     with canvas(2.9 * rows) as figure:
         panels = figure.subplots(rows, columns, squeeze=False).ravel()
         for axes, part in zip(panels, fit.parts, strict=False):
-            data, width = part.data, band(fit, part, part.data, part.jacobian)
+            data, width = part.data, band(fit, part, part.data, part.jacobian, np.diag(part.scatter))
             for series in np.unique(data.series):
                 mine = np.flatnonzero(data.series == series)
                 mine = mine[np.argsort(data.at[mine])]

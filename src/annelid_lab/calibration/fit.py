@@ -1,8 +1,9 @@
 """Fits a worm's parameters to all experiments of a study at once.
 
-Generalised least squares over logarithms of the parameters (`scipy.optimize.least_squares`, trust region reflective).
-Fit and errors of the points (`noise`) are found in turn, since each needs the other. Derivatives are differences; the
-tests of all parameters are computed together.
+Generalised least squares over logarithms of the parameters. Worms spread over a region (Halton's sequence) are computed
+side by side, an emulator is fitted to them (`model`), and its optimum is computed, too; the region follows and shrinks
+to where the data leave the parameters open. Of all worms computed the one that fits best is kept. Fit and errors of the
+points (`noise`) are found in turn, since each needs the other.
 """
 
 from __future__ import annotations
@@ -11,34 +12,40 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from annelid.config import RunConfig, check_section, load_config
-from annelid.errors import ConfigError, SimulationStopped
+from annelid.errors import SimulationStopped
 from annelid.protocols import Array
-from annelid_lab.calibration.base import Data, Experiment, Found
+from annelid_lab.calibration.base import Data, Experiment
+from annelid_lab.calibration.model import Emulator, Model, Tried, n_terms
 from annelid_lab.calibration.noise import Noise, estimated, whitened
 from annelid_lab.calibration.simulations import Simulations
 from annelid_lab.calibration.study import IdentifyStudy
 
-STEP = 0.04
-"""Relative step of the derivatives, above the scatter of a mesh that buckles a little differently each time."""
-SMALL_STEP = 1e-4
-"""The same of closed forms, which do not scatter."""
-MOST_EVALUATIONS = 12
-"""Evaluations of the optimiser beside those for derivatives, for each estimate of the errors."""
+FIRST = 0.7
+"""Radius of the first region in logarithms: half to twice the first guess."""
+SHRINK = 0.3
+"""Radius of a region of the one before."""
+REACH = 4.0
+"""Radius of the last region in standard errors, beside what the scatter of worms asks for."""
+CLEAR = 3.0
+"""How many times as far as worms scatter a parameter must move the points in the last region."""
+LAST, SMOOTH = 4, 0.3
+"""Worms in the last region, of the terms of the emulator; few are enough where they scatter less, in standard
+deviations of the residuals."""
+MOST_REGIONS = 8
+RIVAL_START, RIVAL = 1.5, 1.2
+"""Rms over the best one of a far worm of the first region from which another optimum is looked for, and of an optimum
+that is reported."""
 ROUNDS = 3
 """Estimates of the errors, each followed by a fit."""
 SINGULAR = 1e-12
 """Least eigenvalue of what the data know, of the greatest."""
-FIRST_NOISE = 0.02
-"""Noise that is assumed before any is known, of the range of the values."""
-OFF_SCALE = 20.0
-"""Data that are so many times as large or as small as the worm's have another unit than their columns say."""
-FAILED = 1e3
-"""Residual, in standard deviations, of a worm that gives way."""
+LEAST_NOISE = 1e-6
+"""Noise at least, of the range of the values."""
+LEAST_SPARE = 0.2
+"""Share of a worm that its emulator leaves free, at least."""
 
 
 @dataclass(frozen=True)
@@ -51,10 +58,15 @@ class Part:
         held: Those that are held out.
         fitted: Prediction of the points, ``(n,)``.
         held_fitted: Of those held out.
+        smooth: Prediction of the points by the emulator at its optimum.
         jacobian: Change of a prediction for a relative change of each parameter, ``(n, p)``.
         held_jacobian: Of those held out.
         noise: Errors of the points.
+        scatter: Covariance of worms about the emulator, ``(n, n)``.
+        held_scatter: Variance of the same of the points held out.
+        floor: Standard deviation of the noise of the points as far as it is known without the fit, ``(n,)``.
         numbers: Further numbers, by name.
+        doubts: What is wrong with the data, a sentence each.
     """
 
     experiment: Experiment
@@ -62,10 +74,15 @@ class Part:
     held: Data
     fitted: Array
     held_fitted: Array
+    smooth: Array
     jacobian: Array
     held_jacobian: Array
     noise: Noise
+    scatter: Array
+    held_scatter: Array
+    floor: Array | None
     numbers: dict[str, float]
+    doubts: list[str]
 
     @property
     def residual(self) -> Array:
@@ -74,8 +91,8 @@ class Part:
 
     @cached_property
     def root(self) -> Array:
-        """Lower root of the points' covariance."""
-        return self.noise.root(self.data)
+        """Lower root of the points' covariance about the emulator."""
+        return self.noise.root(self.data, self.scatter)
 
     @property
     def rms(self) -> float:
@@ -95,15 +112,21 @@ class Fit:
 
     Attributes:
         study: The study.
-        logs: Logarithms of the fitted parameters, ``(p,)``.
+        logs: Logarithms of the fitted parameters, of a worm that was computed, ``(p,)``.
+        middle: Those of the emulator's optimum, about which the intervals lie.
+        emulator: Of the worms about the fitted one.
         parts: The experiments.
-        prior: Residuals of the priors and their derivatives, ``(k,)`` and ``(k, p)``.
+        rival: Another worm, far from it, that fits about as well: its logarithms, and its rms over the fitted one's.
+        prior: Residuals of the priors at the middle and their derivatives, ``(k,)`` and ``(k, p)``.
         n_tests: Tests of worms that were computed.
     """
 
     study: IdentifyStudy
     logs: Array
+    middle: Array
+    emulator: Emulator
     parts: tuple[Part, ...]
+    rival: tuple[Array, float] | None
     prior: tuple[Array, Array]
     n_tests: int
 
@@ -123,10 +146,33 @@ class Fit:
         return sum((part.information for part in self.parts), self.prior[1].T @ self.prior[1])
 
     @cached_property
+    def from_noise(self) -> Array:
+        """Covariance of the logarithms by the errors of the points; what the data say nothing of has a huge one."""
+        return inverse(self.information)
+
+    @cached_property
+    def from_scatter(self) -> Array:
+        """The same by the scatter of worms: each is fitted as if it were the robot, by an emulator without it."""
+        off, leverage = self.emulator.off
+        errors = np.zeros((len(leverage), len(self.middle)))
+        for number in range(len(leverage)):
+            # The weights must not know the worm that they are tried on.
+            others = np.arange(len(leverage)) != number
+            information, pull = self.prior[1].T @ self.prior[1], np.zeros(len(self.middle))
+            for part, rows, held in zip(self.parts, off, self.emulator.model.rows, strict=True):
+                own = rows[:, ~held]
+                scatter = own[others].T @ own[others] / max(self.emulator.spare - 1, 1)
+                root = part.noise.root(part.data, scatter)
+                j = whitened(root, part.jacobian)
+                information = information + j.T @ j
+                pull = pull + j.T @ whitened(root, own[number]) / max(1.0 - leverage[number], LEAST_SPARE)
+            errors[number] = inverse(information) @ pull
+        return errors.T @ errors / len(errors)
+
+    @cached_property
     def covariance(self) -> Array:
-        """Covariance of the logarithms of the parameters, ``(p, p)``; what the data say nothing of has a huge one."""
-        values, vectors = np.linalg.eigh(self.information)
-        return (vectors / np.maximum(values, SINGULAR * values[-1])) @ vectors.T
+        """Covariance of the logarithms of the parameters, ``(p, p)``."""
+        return self.from_noise + self.from_scatter
 
     @property
     def at_bound(self) -> tuple[str, ...]:
@@ -135,104 +181,10 @@ class Fit:
         return tuple(n for n, one in known if not 1.01 * one.low < self.values[n] < 0.99 * one.high)
 
 
-class Model:
-    """Predicts the points of all experiments from values of the parameters."""
-
-    def __init__(self, study: IdentifyStudy, folder: Path, simulations: Simulations) -> None:
-        """Reads the data of a study in a folder."""
-        self.study, self.simulations, self.worm = study, simulations, study.worm(folder)
-        self.data = [one.read(folder) for one in study.experiments]
-        self.rows = [held_out(one, data) for one, data in zip(study.experiments, self.data, strict=True)]
-        n_fitted = sum(int((~held).sum()) for held in self.rows)
-        if n_fitted <= len(study.parameters):
-            raise ConfigError(f"{n_fitted} points cannot fit {len(study.parameters)} parameters")
-        self._slopes: list[tuple[Array, list[Array]]] = []
-
-    def worms(self, logs: Array) -> tuple[RunConfig, list[Experiment]]:
-        """Returns the worm and the experiments for logarithms of the parameters, ``(p,)``."""
-        changes: dict[str, float] = {}
-        for (_, one), value in zip(self.study.parameters.items(), np.exp(logs).tolist(), strict=True):
-            for field, share in one.fields.items():
-                for path in self.study.paths(field):
-                    changes[path] = share * value
-        worm: dict[str, Any] = {p: value for p, value in changes.items() if not p.startswith("experiments.")}
-        own: list[dict[str, float]] = [
-            {p.rsplit(".", 1)[1]: v for p, v in changes.items() if p.startswith(f"experiments.{one.name}.")}
-            for one in self.study.experiments
-        ]
-        config = load_config(self.worm.model_dump(exclude_none=True), worm)
-        return config, [
-            check_section(type(one), one.model_dump() | its) if its else one
-            for one, its in zip(self.study.experiments, own, strict=True)
-        ]
-
-    def found(self, many: Sequence[Array], stage: str) -> list[list[Found]]:
-        """Computes what the tests of several worms give, all at once, in the order of the experiments."""
-        wanted = []
-        for logs in many:
-            config, experiments = self.worms(logs)
-            wanted += [(one.test(config, data), config) for one, data in zip(experiments, self.data, strict=True)]
-        done = iter(self.simulations.compute([(t, c) for t, c in wanted if t is not None], stage))
-        results: list[Found] = [{} if test is None else next(done) for test, _ in wanted]
-        n = len(self.data)
-        return [results[i : i + n] for i in range(0, len(results), n)]
-
-    def predicted(self, many: Sequence[Array], stage: str = "identifying") -> list[list[Array]]:
-        """Predicts all points of several worms, in the order of the experiments."""
-        predicted: list[list[Array]] = []
-        for logs, found in zip(many, self.found(many, stage), strict=True):
-            config, experiments = self.worms(logs)
-            pairs = zip(experiments, self.data, found, strict=True)
-            predicted.append([one.predicted(config, data, what) for one, data, what in pairs])
-        return predicted
-
-    def derivatives(self, logs: Array) -> list[Array]:
-        """Returns the change of every prediction for a relative change of each parameter, ``(n, p)``."""
-        for at, known in self._slopes:
-            # Differences over a step change less than that from so near a place.
-            if np.abs(logs - at).max() <= STEP / 4:
-                return known
-        high = bounds(self.study)[1]
-        steps = [STEP if logs[i] + STEP <= high[i] else -STEP for i in range(len(logs))]
-        moved = [logs + step * axis for step, axis in zip(steps, np.eye(len(logs)), strict=True)]
-        here, *there = self.predicted([logs, *moved])
-        slopes = [
-            np.stack([(one[part] - here[part]) / step for one, step in zip(there, steps, strict=True)], axis=-1)
-            for part in range(len(self.data))
-        ]
-        slopes = [own if exact is None else exact for own, exact in zip(slopes, self._closed(logs), strict=True)]
-        self._slopes.append((logs, slopes))
-        return slopes
-
-    def _closed(self, logs: Array) -> list[Array | None]:
-        """Central differences of the experiments that need no test of a worm, by a small step; None for the others."""
-        config, experiments = self.worms(logs)
-        closed = [one.test(config, data) is None for one, data in zip(experiments, self.data, strict=True)]
-        slopes: list[list[Array]] = [[] for _ in experiments]
-        for axis in np.eye(len(logs)):
-            ends = [self.worms(logs + sign * SMALL_STEP * axis) for sign in (1.0, -1.0)]
-            for part, data in enumerate(self.data):
-                if closed[part]:
-                    ahead, behind = (own[part].predicted(worm, data, {}) for worm, own in ends)
-                    slopes[part].append((ahead - behind) / (2.0 * SMALL_STEP))
-        return [np.stack(own, axis=-1) if is_closed else None for own, is_closed in zip(slopes, closed, strict=True)]
-
-
-def bounds(study: IdentifyStudy) -> tuple[Array, Array]:
-    """Logarithms of the bounds of the parameters, ``(p,)`` each."""
-    known = study.parameters.values()
-    return np.log([one.low for one in known]), np.log([one.high for one in known])
-
-
-def held_out(experiment: Experiment, data: Data) -> np.ndarray:
-    """Which points of an experiment are held out, ``(n,)``."""
-    place = (np.arange(len(data.at)) + 0.5) / len(data.at)
-    held = np.zeros(len(place), dtype=bool)
-    for low, high in experiment.hold_out:
-        held |= (place >= low) & (place < high)
-    if held.sum() > 0.8 * len(held):
-        raise ConfigError(f"experiments.{experiment.name}.hold_out leaves {(~held).sum()} of {len(held)} points to fit")
-    return held
+def inverse(information: Array) -> Array:
+    """Returns the covariance, ``(p, p)``, that belongs to an information, huge where there is none."""
+    values, vectors = np.linalg.eigh(information)
+    return (vectors / np.maximum(values, SINGULAR * values[-1])) @ vectors.T
 
 
 def points_at(data: Data, rows: np.ndarray) -> Data:
@@ -251,6 +203,58 @@ def prior_rows(study: IdentifyStudy, logs: Array) -> tuple[Array, Array]:
     return np.array([row[0] for row in rows]), jacobian
 
 
+class Errors:
+    """Errors of the fitted points of all experiments, and the misfit that they weigh."""
+
+    def __init__(self, model: Model, noises: Sequence[Noise], scatter: Sequence[Array] | None = None) -> None:
+        """Takes the noise of each experiment and perhaps the scatter of worms about the emulator."""
+        self.model, self.noises = model, list(noises)
+        self.kept = [points_at(data, ~held) for data, held in zip(model.data, model.rows, strict=True)]
+        spread = [None] * len(noises) if scatter is None else scatter
+        self._roots = [
+            noise.root(data, None if own is None else own[np.ix_(~held, ~held)])
+            for noise, data, own, held in zip(noises, self.kept, spread, model.rows, strict=True)
+        ]
+
+    def rows(self, logs: Array, predicted: Sequence[Array]) -> Array:
+        """Residuals in standard deviations, with those of the priors, ``(n,)``."""
+        parts = zip(self._roots, self.kept, predicted, self.model.rows, strict=True)
+        own = [whitened(root, one[~held] - data.values) for root, data, one, held in parts]
+        return np.concatenate([*own, prior_rows(self.model.study, logs)[0]])
+
+    def misfit(self, one: Tried) -> float:
+        """Sum of squares of a worm that was computed."""
+        return float((self.rows(one.logs, self.model.measured(one)) ** 2).sum())
+
+    def minimise(self, emulator: Emulator, start: Array, low: Array, high: Array) -> tuple[Array, Array]:
+        """Returns the emulator's optimum between bounds, and the information there."""
+        # Loading it takes a second, which only a fit should pay.
+        from scipy.optimize import least_squares
+
+        found = least_squares(
+            lambda at: self.rows(at, emulator.predicted(at)),
+            np.clip(start, low + 1e-9, high - 1e-9),
+            bounds=(low, high),
+            x_scale=np.where(np.isfinite(emulator.radius), emulator.radius, 0.1),
+            diff_step=1e-4,
+            xtol=1e-4,
+            ftol=1e-6,
+            max_nfev=30,
+        )
+        return found.x, found.jac.T @ found.jac
+
+
+def plain(model: Model, one: Tried) -> Errors:
+    """Independent errors of the size of a worm's residuals: no discrepancy explains a bad fit away."""
+    noises = []
+    for own, data, held, there in zip(
+        model.study.experiments, model.data, model.rows, model.measured(one), strict=True
+    ):
+        size = float(np.sqrt(((data.values - there)[~held] ** 2).mean()))
+        noises.append(Noise(max(size, own.noise_sd or 0.0, LEAST_NOISE * float(np.ptp(data.values)))))
+    return Errors(model, noises)
+
+
 def fitted(study: IdentifyStudy, folder: Path, simulations: Simulations) -> tuple[Fit, Model]:
     """Fits a study whose data lie in a folder.
 
@@ -258,93 +262,171 @@ def fitted(study: IdentifyStudy, folder: Path, simulations: Simulations) -> tupl
         ConfigError: The data do not fit the experiments, or are too few.
         SimulationStopped: The worm that the fit starts from gives way.
     """
-    # Loading it takes a second, which only a fit should pay.
-    from scipy.optimize import least_squares
-
     model = Model(study, folder, simulations)
-    logs = np.log([one.start for one in study.parameters.values()])
-    low, high = bounds(study)
-    _refuse_unlike(study, model, model.predicted([logs])[0])
-    noises = [
-        Noise(one.noise_sd or FIRST_NOISE * float(np.ptp(data.values)))
-        for one, data in zip(study.experiments, model.data, strict=True)
-    ]
-    for left in reversed(range(ROUNDS + 1)):
-        kept = [points_at(data, ~held) for data, held in zip(model.data, model.rows, strict=True)]
-        roots = [noise.root(data) for noise, data in zip(noises, kept, strict=True)]
+    first = model.run([model.start])[0]
+    if first is None:
+        raise SimulationStopped("the worm that the fit starts from gives way: set the parameters' start otherwise")
+    for one, data, found, there in zip(study.experiments, model.data, first.found, model.measured(first), strict=True):
+        one.refuse_unlike(data, found, there)
+    best, emulator = _searched(model, first, FIRST)
+    return _finished(model, best, emulator, _rival(model, best)), model
 
-        def residual(at: Array, roots: list[Array] = roots, kept: list[Data] = kept) -> Array:
-            try:
-                there = model.predicted([at])[0]
-            except SimulationStopped:
-                return np.full(sum(len(one.at) for one in kept) + len(prior_rows(study, at)[0]), FAILED)
-            rows = zip(roots, kept, there, model.rows, strict=True)
-            own = [whitened(root, one[~held] - data.values) for root, data, one, held in rows]
-            return np.concatenate([*own, prior_rows(study, at)[0]])
 
-        def jacobian(at: Array, roots: list[Array] = roots) -> Array:
-            pairs = zip(roots, model.derivatives(at), model.rows, strict=True)
-            return np.concatenate([*(whitened(root, j[~held]) for root, j, held in pairs), prior_rows(study, at)[1]])
+def _searched(model: Model, best: Tried, first: float) -> tuple[Tried, Emulator]:
+    """Finds the region of the best fit from a worm and a radius on: returns the best worm and the region's emulator."""
+    from scipy.stats import qmc
 
-        found = least_squares(
-            residual,
-            np.clip(logs, low + 1e-9, high - 1e-9),
-            bounds=(low, high),
-            method="trf",
-            jac=jacobian,  # pyright: ignore[reportArgumentType]
-            max_nfev=MOST_EVALUATIONS,
-            # Until the errors of the points are known, an exact optimum means little.
-            xtol=1e-3 if left < ROUNDS else 1e-2,
-            ftol=1e-4 if left < ROUNDS else 1e-2,
-        )
-        moved, logs = float(np.abs(found.x - logs).max()), found.x
-        fit = _fit_of(model, logs, noises)
-        if not left or (left < ROUNDS and moved < STEP / 10):
+    moving, quadratic = model.moving, n_terms(len(model.moving), 2)
+    is_moving = np.isin(np.arange(len(model.start)), moving)
+    centre, radius = best.logs, np.where(is_moving, first, np.inf)
+    draw = qmc.Halton(max(len(moving), 1), rng=2026)
+    last, was_fine, wanted = not moving, False, 2 * quadratic
+    for _ in range(MOST_REGIONS):
+        low, high = np.maximum(centre - radius, model.low), np.minimum(centre + radius, model.high)
+        inside = [one for one in model.tried if (np.abs(one.logs - centre) <= radius)[moving].all()]
+        if moving and (missing := wanted - len(inside)) > 0:
+            many = np.tile(centre, (missing, 1))
+            many[:, moving] = low[moving] + draw.random(missing) * (high - low)[moving]
+            model.run(list(many))
+        best = _best(model, plain(model, best), best)
+        if last:
             break
-        noises = _errors(fit)
-    return _fit_of(model, logs, noises), model
+        emulator = _emulator(model, centre, radius, quadratic + 2)
+        errors = Errors(model, plain(model, best).noises, emulator.scatter())
+        optimum, _ = errors.minimise(emulator, best.logs, low, high)
+        model.run([optimum])
+        best = _best(model, plain(model, best), replace(best, logs=model.with_untested(best, optimum).logs))
+        share, clear, known = _goal(model, emulator, best)
+        is_open = known >= radius
+        goal = clear + known
+        # Once an emulator is as good as the fit, one smaller region shows whether its scatter is that of any worm.
+        last = bool(is_open[moving].all() or (share <= 1.0 and (was_fine or (goal <= radius)[moving].all())))
+        was_fine = share <= 1.0
+        edge = np.abs(best.logs - centre) > 0.8 * radius
+        centre = best.logs
+        goal = np.clip(goal, radius * SHRINK**2, radius) if last else np.where(is_open, radius, radius * SHRINK)
+        radius = np.where(is_moving, np.where(edge, radius, goal), np.inf)
+        wanted = LAST * quadratic if last and share > SMOOTH else quadratic + 2
+    return best, _emulator(model, centre, radius, quadratic + 2)
 
 
-def _fit_of(model: Model, logs: Array, noises: Sequence[Noise]) -> Fit:
-    predicted, jacobians = model.predicted([logs])[0], model.derivatives(logs)
-    experiments, found = model.worms(logs)[1], model.found([logs], "identifying")[0]
-    parts: list[Part] = []
-    for one, data, held, there, j, noise, what in zip(
-        experiments, model.data, model.rows, predicted, jacobians, noises, found, strict=True
-    ):
-        numbers = one.numbers(data, what)
-        parts.append(
-            Part(
-                one,
-                points_at(data, ~held),
-                points_at(data, held),
-                there[~held],
-                there[held],
-                j[~held],
-                j[held],
-                noise,
-                numbers,
-            )
+def _rival(model: Model, best: Tried) -> tuple[Array, float] | None:
+    """Looks for another optimum, from the best worm of the first region that no slope joins with the best one."""
+    moving, errors = model.moving, plain(model, best)
+    design = model.tried[: 1 + 2 * n_terms(len(moving), 2)]
+    away = [np.abs(one.logs - best.logs)[moving].max(initial=0.0) > FIRST / 2 for one in design]
+    far = [model.with_untested(one, best.logs) for one, is_far in zip(design, away, strict=True) if is_far]
+    near = [model.with_untested(one, best.logs) for one, is_far in zip(design, away, strict=True) if not is_far]
+    if not far or not near:
+        return None
+    other = min(far, key=errors.misfit)
+    if errors.misfit(other) > RIVAL_START**2 * min(map(errors.misfit, near)):
+        return None
+    between = model.run([(other.logs + best.logs) / 2.0])[0]
+    if between is None or errors.misfit(between) < errors.misfit(other):
+        return None
+    kept, model.tried = model.tried, [other]
+    found, _ = _searched(model, other, FIRST * SHRINK)
+    model.tried = kept
+    ratio = float(np.sqrt(errors.misfit(found) / errors.misfit(best)))
+    is_far = np.abs(found.logs - best.logs)[moving].max() > FIRST * SHRINK
+    return (found.logs, ratio) if is_far and ratio < RIVAL else None
+
+
+def _goal(model: Model, emulator: Emulator, best: Tried) -> tuple[float, Array, Array]:
+    """Returns how far worms scatter about an emulator, in standard deviations of the residuals, and two radii.
+
+    In the first, ``(p,)``, every parameter moves the points clearly farther than worms scatter; in the second, the data
+    leave it open.
+    """
+    sizes = [noise.noise for noise in plain(model, best).noises]
+    slopes = [j[~held] for j, held in zip(emulator.derivatives(best.logs), model.rows, strict=True)]
+    scatter = zip(emulator.scatter(), model.rows, sizes, strict=True)
+    off = np.sqrt(max(np.diag(own)[~held].mean() / size**2 for own, held, size in scatter))
+    moves = np.mean([(j**2).mean(axis=0) / size**2 for j, size in zip(slopes, sizes, strict=True)], axis=0)
+    rows = np.concatenate([j / size for j, size in zip(slopes, sizes, strict=True)])
+    return float(off), CLEAR * off / np.sqrt(np.maximum(moves, 1e-12)), REACH * np.sqrt(np.diag(inverse(rows.T @ rows)))
+
+
+def _best(model: Model, errors: Errors, one: Tried) -> Tried:
+    """The best of the worms that were computed, with the parameters of one that no test depends on."""
+    return min((model.with_untested(other, one.logs) for other in model.tried), key=errors.misfit)
+
+
+def _emulator(model: Model, centre: Array, radius: Array, fewest: int) -> Emulator:
+    """An emulator of the worms in a region, or of the nearest ones where it has too few."""
+    m = model.moving
+    away = [np.abs((one.logs - centre) / radius)[m].max(initial=0.0) for one in model.tried]
+    near = np.argsort(away, kind="stable")
+    inside = max(sum(one <= 1.0 + 1e-9 for one in away), fewest if m else 1)
+    return Emulator(model, [model.tried[i] for i in near[:inside]], centre, radius)
+
+
+def _finished(model: Model, best: Tried, emulator: Emulator, rival: tuple[Array, float] | None) -> Fit:
+    """Finds the errors of the points and the optimum in the last region, in turn."""
+    scatter, errors = emulator.scatter(), plain(model, best)
+    low = np.maximum(emulator.centre - 1.5 * emulator.radius, model.low)
+    high = np.minimum(emulator.centre + 1.5 * emulator.radius, model.high)
+    middle, noises = best.logs, errors.noises
+    for _ in range(ROUNDS):
+        middle, _ = Errors(model, noises, scatter).minimise(emulator, middle, low, high)
+        noises = _errors(_fit_of(model, emulator, best, middle, noises, scatter))
+    model.run([middle, *_finish(_fit_of(model, emulator, best, middle, noises, scatter), low, high)])
+    best = _best(model, Errors(model, noises), replace(best, logs=middle))
+    return replace(_fit_of(model, emulator, best, middle, noises, scatter), rival=rival)
+
+
+def _finish(fit: Fit, low: Array, high: Array) -> list[Array]:
+    """Draws worms from what the data leave open, where worms scatter: one of them may lie nearer than the middle."""
+    from scipy.stats import norm, qmc
+
+    moving = fit.emulator.model.moving
+    if not moving or max(float(np.diag(p.scatter).mean()) / p.noise.noise**2 for p in fit.parts) < SMOOTH**2:
+        return []
+    shares = qmc.Halton(len(moving), rng=2027).random(2 * n_terms(len(moving), 2))
+    spread = np.linalg.cholesky(fit.covariance[np.ix_(moving, moving)])
+    many = np.tile(fit.middle, (len(shares), 1))
+    many[:, moving] += norm.ppf(shares) @ spread.T
+    return list(np.clip(many, low, high))
+
+
+def _fit_of(
+    model: Model, emulator: Emulator, best: Tried, middle: Array, noises: Sequence[Noise], scatter: Sequence[Array]
+) -> Fit:
+    experiments = model.worms(best.logs)[1]
+    fitted, smooth = model.measured(best), emulator.predicted(middle)
+    slopes = emulator.derivatives(middle)
+    floors = [one.noise_floor(data) for one, data in zip(experiments, model.data, strict=True)]
+    parts = tuple(
+        Part(
+            experiments[e],
+            points_at(data, ~held),
+            points_at(data, held),
+            fitted[e][~held],
+            fitted[e][held],
+            smooth[e][~held],
+            slopes[e][~held],
+            slopes[e][held],
+            noises[e],
+            scatter[e][np.ix_(~held, ~held)],
+            np.diag(scatter[e])[held],
+            None if floor is None else floor[~held],
+            experiments[e].numbers(data, best.found[e]),
+            experiments[e].doubts(data, best.found[e]),
         )
-    return Fit(model.study, logs, tuple(parts), prior_rows(model.study, logs), model.simulations.computed)
+        for e, (data, held, floor) in enumerate(zip(model.data, model.rows, floors, strict=True))
+    )
+    prior = prior_rows(model.study, middle)
+    return Fit(model.study, best.logs, middle, emulator, parts, None, prior, model.simulations.computed)
 
 
 def _errors(fit: Fit) -> list[Noise]:
-    """Estimates the errors of every experiment from a fit's residuals."""
+    """Estimates the errors of every experiment from the residuals at the emulator's optimum."""
     prior = fit.prior[1].T @ fit.prior[1]
     elsewhere = [sum((other.information for other in fit.parts if other is not part), prior) for part in fit.parts]
     return [
-        estimated(part.data, part.residual, part.jacobian, known, part.experiment.noise_sd)
+        estimated(
+            part.data, part.data.values - part.smooth, part.jacobian, known, part.experiment.noise_sd, part.scatter
+        )
         for part, known in zip(fit.parts, elsewhere, strict=True)
     ]
-
-
-def _refuse_unlike(study: IdentifyStudy, model: Model, predicted: Sequence[Array]) -> None:
-    """Refuses data that the worm misses by orders of magnitude."""
-    for one, data, there in zip(study.experiments, model.data, predicted, strict=True):
-        sizes = [float(np.abs(values).max()) for values in (data.values, there)]
-        if min(sizes) > 0 and not 1 / OFF_SCALE < sizes[0] / sizes[1] < OFF_SCALE:
-            raise ConfigError(
-                f"the data of experiments.{one.name} reach {sizes[0]:.3g} {data.unit}, the worm that the fit starts "
-                f"from {sizes[1]:.3g} {data.unit}: is a unit wrong?"
-            )

@@ -329,7 +329,7 @@ def draw_loops(loops: Mapping[str, Loop], stem: Path, per_diameter: float) -> Pa
     with canvas(3.6) as figure:
         axes = figure.subplots()
         lines = {name: (loop.displacement_m / MM, loop.force_N) for name, loop in loops.items()}
-        draw_lines(axes, lines, markers=False)
+        draw_lines(axes, lines, marker="")
         for order, line in enumerate(axes.lines):
             line.set(zorder=3 - order, linewidth=0.9 if order else 1.6)
         displacement = f"displacement of the cable (mm), {per_diameter:.3g} times the change of diameter"

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import exp, sqrt
+from math import sqrt
 
 import numpy as np
 
-from annelid.errors import SimulationStopped
 from annelid.protocols import Array
 from annelid_lab.calibration.base import Data
-from annelid_lab.calibration.fit import SINGULAR, Fit, Model, Part, bounds, prior_rows
+from annelid_lab.calibration.fit import SINGULAR, Fit, Part, prior_rows
+from annelid_lab.calibration.model import Model
 from annelid_lab.calibration.noise import whitened
 
 LEVEL = 0.95
@@ -20,10 +20,6 @@ FEWEST_FREE = 2.0
 """Degrees of freedom at least, of the errors of an experiment."""
 WIDEST = 3.0
 """How many times as wide as the linear interval a profile is followed."""
-UNKNOWN = 0.3
-"""Relative error of a combination of parameters above which the data do not determine it."""
-ALIKE = 0.9
-"""Correlation above which two parameters are not told apart."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +33,6 @@ class Intervals:
         errors: Relative standard errors of independent combinations of the parameters, greatest first, ``(p,)``.
         directions: The combinations, a row each, in relative changes, ``(p, p)``.
         quantile: Standard errors from the value to the end of an interval, ``(p,)``.
-        confused: What the data cannot tell apart, a sentence each.
         held_out: Points that were held out, and how many of them lie in the intervals predicted, by experiment.
     """
 
@@ -47,12 +42,11 @@ class Intervals:
     errors: Array
     directions: Array
     quantile: Array
-    confused: tuple[str, ...]
     held_out: dict[str, tuple[int, int]]
 
 
 def intervals(fit: Fit, model: Model) -> Intervals:
-    """Finds the intervals of a fit; the profile takes two tests of each experiment for every parameter."""
+    """Finds the intervals of a fit."""
     quantile = _quantiles(fit)
     error = np.sqrt(np.diag(fit.covariance))
     values, vectors = np.linalg.eigh(fit.information)
@@ -65,7 +59,6 @@ def intervals(fit: Fit, model: Model) -> Intervals:
         errors=errors,
         directions=vectors.T,
         quantile=quantile,
-        confused=confused(fit.names, correlation, errors, vectors.T),
         held_out={part.experiment.name: _inside(fit, part) for part in fit.parts if len(part.held.at)},
     )
 
@@ -84,50 +77,50 @@ def _quantiles(fit: Fit) -> Array:
     from scipy.stats import t
 
     # The variance of a parameter is C, that of the part's points through the gains C J' R^-1: C (J' R^-1 J) C.
-    shares = [np.diag(fit.covariance @ part.information @ fit.covariance) for part in fit.parts]
+    shares = [np.diag(fit.from_noise @ part.information @ fit.from_noise) for part in fit.parts]
     total = np.maximum(np.diag(fit.covariance), 1e-300)
     slack = sum((share / total) ** 2 / _freedom(fit, part) for share, part in zip(shares, fit.parts, strict=True))
+    slack += (np.diag(fit.from_scatter) / total) ** 2 / max(fit.emulator.spare, 1)
     return t.ppf(0.5 + LEVEL / 2, 1.0 / np.maximum(slack, 1e-9))
 
 
-def band(fit: Fit, part: Part, data: Data, jacobian: Array) -> Array:
+def band(fit: Fit, part: Part, data: Data, jacobian: Array, scatter: Array) -> Array:
     """Half of the interval that the fit predicts for points of an experiment, ``(n,)``."""
     from scipy.stats import t
 
     quantile = float(t.ppf(0.5 + LEVEL / 2, _freedom(fit, part)))
     variance = np.einsum("np,pq,nq->n", jacobian, fit.covariance, jacobian)
-    return quantile * np.sqrt(variance + np.diag(part.noise.covariance(data)))
+    return quantile * np.sqrt(variance + np.diag(part.noise.covariance(data)) + scatter)
 
 
 def _profile(fit: Fit, model: Model, error: Array, quantile: Array) -> Array:
     """Ends of the profile likelihood's intervals, ``(p, 2)``.
 
-    Each parameter is moved to the end of its linear interval and the others with it as the linear model says; there all
-    experiments are simulated, and the others are refitted by one step of Gauss and Newton. The misfit is taken to grow
-    with the square of the way, so its rise there says where it reaches the quantile.
+    Each parameter is moved to the end of its linear interval and the others with it as the linear model says; there the
+    emulator is asked, and the others are refitted by one step of Gauss and Newton. The misfit is taken to grow with the
+    square of the way, so its rise there says where it reaches the quantile.
     """
-    low, high = bounds(fit.study)
-    p = len(fit.logs)
-    reach = quantile * error
-    ways = np.array([sign * reach[i] for i in range(p) for sign in (-1.0, 1.0)])
-    along = np.repeat(fit.covariance / np.diag(fit.covariance), 2, axis=1).T
-    moved = np.clip(fit.logs + ways[:, None] * along, low, high)
-    ways = (moved - fit.logs)[np.arange(2 * p), np.repeat(np.arange(p), 2)]
-    base = _misfit(fit, [part.fitted for part in fit.parts], fit.logs, None)
-    ends = np.empty(2 * p)
-    try:
-        there = model.predicted(list(moved), "profile likelihood")
-    except SimulationStopped:
-        # A worm at an end gives way: the linear intervals stand.
-        return np.exp(np.clip(fit.logs[:, None] + reach[:, None] * [-1.0, 1.0], low[:, None], high[:, None]))
-    for k in range(2 * p):
-        i = k // 2
-        fitted = [one[~held] for one, held in zip(there[k], model.rows, strict=True)]
-        rise = _misfit(fit, fitted, moved[k], i) - base
-        stretch = quantile[i] / sqrt(rise) if rise > (quantile[i] / WIDEST) ** 2 else WIDEST
-        # A way that was cut at a bound counts as far as it went.
-        ends[k] = np.clip(fit.logs[i] + ways[k] * stretch, low[i], high[i])
-    return np.exp(ends.reshape(p, 2))
+    low, high = model.low, model.high
+    linear = np.sqrt(np.diag(fit.from_noise))
+    reach = quantile * linear
+    base = _misfit(fit, [part.smooth for part in fit.parts], fit.middle, None)
+    ends = np.empty((len(fit.middle), 2))
+    for i in range(len(fit.middle)):
+        along = fit.from_noise[i] / fit.from_noise[i, i]
+        for side, sign in enumerate((-1.0, 1.0)):
+            moved = np.clip(fit.middle + sign * reach[i] * along, low, high)
+            way = (moved - fit.middle)[i]
+            if (np.abs(moved - fit.emulator.centre) > WIDEST * fit.emulator.radius).any():
+                # So far away the emulator knows nothing: the linear interval stands.
+                ends[i, side] = np.clip(fit.middle[i] + sign * quantile[i] * error[i], low[i], high[i])
+                continue
+            there = fit.emulator.predicted(moved)
+            fitted = [one[~held] for one, held in zip(there, model.rows, strict=True)]
+            rise = _misfit(fit, fitted, moved, i) - base
+            stretch = quantile[i] / sqrt(rise) if rise > (quantile[i] / WIDEST) ** 2 else WIDEST
+            # A way that was cut at a bound counts as far as it went.
+            ends[i, side] = np.clip(fit.middle[i] + way * stretch * error[i] / linear[i], low[i], high[i])
+    return np.exp(ends)
 
 
 def _misfit(fit: Fit, fitted: Sequence[Array], logs: Array, fixed: int | None) -> float:
@@ -146,33 +139,7 @@ def _misfit(fit: Fit, fitted: Sequence[Array], logs: Array, fixed: int | None) -
 
 def _inside(fit: Fit, part: Part) -> tuple[int, int]:
     """Points held out, and how many lie in the intervals that the fit predicts for them."""
-    inside = np.abs(part.held.values - part.held_fitted) <= band(fit, part, part.held, part.held_jacobian)
+    inside = np.abs(part.held.values - part.held_fitted) <= band(
+        fit, part, part.held, part.held_jacobian, part.held_scatter
+    )
     return len(inside), int(inside.sum())
-
-
-def confused(names: Sequence[str], correlation: Array, errors: Array, directions: Array) -> tuple[str, ...]:
-    """Says which parameters the data cannot tell apart.
-
-    Args:
-        names: Of the parameters, ``(p,)``.
-        correlation: Of the errors of their logarithms, ``(p, p)``.
-        errors: Relative errors of independent combinations, greatest first, ``(p,)``.
-        directions: The combinations, ``(p, p)``.
-    """
-    found: list[str] = []
-    for error, direction in zip(errors, directions, strict=True):
-        if error <= UNKNOWN:
-            continue
-        direction = direction / direction[np.abs(direction).argmax()]
-        shares = [(n, float(s)) for n, s in zip(names, direction, strict=True) if abs(s) > 0.1]
-        up = [name for name, share in shares if share > 0]
-        down = [name for name, share in shares if share < 0]
-        if len(shares) == 1:
-            found.append(f"the data do not determine {up[0]}: its relative error is {error:.3g}")
-        else:
-            how = f"raising {' and '.join(up)}" + (f" while lowering {' and '.join(down)}" if down else "")
-            by = f"by {exp(error) - 1:.0%}" if error < 1.0 else "by any factor"
-            found.append(f"the data do not tell {' and '.join(n for n, _ in shares)} apart: {how} {by} changes nothing")
-    pairs = [(names[k], names[i], correlation[i, k]) for i in range(len(names)) for k in range(i)]
-    alike = (f"{one} and {other} are correlated by {by:+.2f}" for one, other, by in pairs if abs(by) > ALIKE)
-    return (*found, *alike)

@@ -41,9 +41,10 @@ class Noise:
         alike = data.series[:, None] == data.series
         return self.discrepancy**2 * np.exp(-distance / self.length) * alike + self.noise**2 * np.eye(len(data.at))
 
-    def root(self, data: Data) -> Array:
-        """Lower root of the covariance: what it divides is independent with a standard deviation of 1."""
-        return cholesky(self.covariance(data), lower=True)
+    def root(self, data: Data, scatter: Array | None = None) -> Array:
+        """Lower root of the covariance, with another one added: it makes errors independent, of a deviation of 1."""
+        covariance = self.covariance(data)
+        return cholesky(covariance if scatter is None else covariance + scatter, lower=True)
 
     def freedom(self, data: Data) -> float:
         """How many independent points would give the size of the errors as well as these do."""
@@ -58,7 +59,14 @@ class Noise:
         return float(min(ones @ ones, len(data.at)))
 
 
-def estimated(data: Data, residual: Array, jacobian: Array, elsewhere: Array, stated: float | None) -> Noise:
+def estimated(
+    data: Data,
+    residual: Array,
+    jacobian: Array,
+    elsewhere: Array,
+    stated: float | None,
+    scatter: Array | None = None,
+) -> Noise:
     """Estimates the errors of one experiment by restricted maximum likelihood.
 
     Args:
@@ -67,6 +75,7 @@ def estimated(data: Data, residual: Array, jacobian: Array, elsewhere: Array, st
         jacobian: Change of the predicted points with the parameters, ``(n, p)``.
         elsewhere: What other experiments and priors know of the parameters: inverse covariance, ``(p, p)``.
         stated: Standard deviation of the noise, where it is known.
+        scatter: Further covariance of the points that is known, ``(n, n)``.
     """
     from scipy.optimize import minimize
 
@@ -81,7 +90,7 @@ def estimated(data: Data, residual: Array, jacobian: Array, elsewhere: Array, st
         return Noise(noise, exp(logs[0]), exp(logs[1]))
 
     def misfit(logs: Array) -> float:
-        root = errors(logs).root(data)
+        root = errors(logs).root(data, scatter)
         whitened = solve_triangular(root, np.column_stack([residual, jacobian]), lower=True)
         r, j = whitened[:, 0], whitened[:, 1:]
         known = elsewhere + j.T @ j

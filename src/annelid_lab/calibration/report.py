@@ -13,6 +13,8 @@ from rich.table import Table
 
 from annelid.experiment import write_worm
 from annelid.output import write_json
+from annelid_lab.calibration.base import shown_in
+from annelid_lab.calibration.doubts import doubts
 from annelid_lab.calibration.figure import identify_figure
 from annelid_lab.calibration.fit import Fit, fitted
 from annelid_lab.calibration.intervals import LEVEL, Intervals, intervals
@@ -48,6 +50,11 @@ class Identified:
                 changes |= {path: float(f"{share * self.fit.values[name]:.4g}") for path in paths}
         return changes
 
+    @cached_property
+    def warnings(self) -> tuple[str, ...]:
+        """What the fit cannot know, a sentence each."""
+        return doubts(self.fit, self.intervals)
+
     def to_dict(self) -> dict[str, Any]:
         """Returns all numbers, ready for JSON."""
         fit, known = self.fit, self.intervals
@@ -66,7 +73,7 @@ class Identified:
             },
             "correlation": known.correlation.tolist(),
             "combinations": {"relative_error": known.errors.tolist(), "directions": known.directions.tolist()},
-            "confused": list(known.confused),
+            "warnings": list(self.warnings),
             "experiments": {
                 part.experiment.name: {
                     "unit": part.data.unit,
@@ -121,35 +128,34 @@ def identify(
 def tables(found: Identified) -> list[Table]:
     """Tabulates parameters with their intervals, and experiments with their errors."""
     fit, known = found.fit, found.intervals
-    caption = "; ".join(known.confused) or "the data tell all parameters apart"
-    first = Table("parameter", "unit", title=f"{found.study.name}: {fit.n_tests} tests of worms", caption=caption)
-    for heading in ("value", "95 % profile likelihood", "largest correlation"):
+    many = len(found.warnings)
+    caption = f"warnings: {many}" if many else "the data tell all parameters apart"
+    first = Table("parameter", title=f"{found.study.name}: {fit.n_tests} tests of worms", caption=caption)
+    for heading in ("value", "95 % interval", "correlation"):
         first.add_column(heading, justify="right")
     for i, (name, value) in enumerate(fit.values.items()):
         others = np.delete(np.arange(len(fit.names)), i)
         worst = others[np.abs(known.correlation[i, others]).argmax()] if len(others) else i
+        factor, unit = shown_in(found.study.parameters[name].unit, value)
         first.add_row(
             name,
-            found.study.parameters[name].unit,
-            f"{value:.4g}" + (" (bound)" if name in fit.at_bound else ""),
-            f"{known.profile[i, 0]:.4g} to {known.profile[i, 1]:.4g}",
+            f"{value / factor:.4g}{unit}",
+            f"{known.profile[i, 0] / factor:.4g} to {known.profile[i, 1] / factor:.4g}",
             f"{known.correlation[i, worst]:+.2f} {fit.names[worst]}" if len(others) else "",
         )
-    second = Table("experiment", "unit", title="errors of the experiments, standard deviations of a point")
-    for heading in ("rms", "of the peak", "noise", "discrepancy", "over", "points count as", "held out, inside"):
+    second = Table("experiment", title="errors of the experiments, standard deviations of a point")
+    for heading in ("rms", "noise", "discrepancy", "points count as", "held out"):
         second.add_column(heading, justify="right")
     for part in fit.parts:
         n, inside = known.held_out.get(part.experiment.name, (0, 0))
+        factor, unit = shown_in(part.data.unit, part.rms)
         second.add_row(
             part.experiment.name,
-            part.data.unit,
-            f"{part.rms:.3g}",
-            f"{part.rms / np.abs(part.data.values).max():.1%}",
-            f"{part.noise.noise:.3g}",
-            f"{part.noise.discrepancy:.3g}",
-            f"{part.noise.length:.3g}",
+            f"{part.rms / factor:.3g}{unit}",
+            f"{part.noise.noise / factor:.3g}{unit}",
+            f"{part.noise.discrepancy / factor:.3g}{unit}",
             f"{part.noise.effective_points(part.data):.1f} of {len(part.data.at)}",
-            f"{inside} of {n}" if n else "",
+            f"{inside} of {n} inside" if n else "",
         )
     return [first, second]
 
@@ -159,8 +165,9 @@ def write_identified(found: Identified, output: Path) -> list[Path]:
     fit, known = found.fit, found.intervals
     lines = [f"Identified by the study {found.study.name}: value, 95 % interval."]
     for i, (name, value) in enumerate(fit.values.items()):
-        unit = found.study.parameters[name].unit
-        lines.append(f"  {name}: {value:.4g} {unit}, {known.profile[i, 0]:.4g} to {known.profile[i, 1]:.4g}")
+        factor, unit = shown_in(found.study.parameters[name].unit, value)
+        low, high = known.profile[i] / factor
+        lines.append(f"  {name}: {value / factor:.4g}{unit}, {low:.4g} to {high:.4g}")
     lines.append(f"Errors for `annelid run --uncertainty-from {REPORT}`.")
     write_worm(output / WORM, found.study.source(found.folder), {"name": found.study.name, **found.overrides}, lines)
     return [

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from annelid.config import RunConfig
-from annelid.errors import ClusterError
+from annelid.errors import ClusterError, SimulationStopped
 from annelid.experiment import StudyProgress, answers, physics_fingerprint, room_of
 from annelid.output import whole_file
 from annelid_lab.calibration.base import Found, Test
@@ -57,19 +57,19 @@ class Simulations:
             progress: Called with the stage as tests go on.
         """
         self._folder, self._executor, self._progress = folder, executor, progress
-        self._known: dict[str, Found] = {}
+        self._known: dict[str, Found | None] = {}
         self.computed = 0
         """How many tests were computed, and not found."""
 
-    def compute(self, wanted: Sequence[tuple[Test, RunConfig]], stage: str) -> list[Found]:
-        """Computes those that are not there yet.
+    def compute(self, wanted: Sequence[tuple[Test, RunConfig]], stage: str) -> list[Found | None]:
+        """Computes those that are not there yet; None for a worm that gives way.
 
         Args:
             wanted: The tests, each with its worm.
             stage: What is done, in a few words.
 
         Raises:
-            AnnelidError: A test cannot be done, or its worm gives way. Others are kept.
+            AnnelidError: A test cannot be done. Others are kept.
         """
         tasks = [Simulation(test, config.model_dump_json(exclude={"name", "summary"})) for test, config in wanted]
         names = [task.name for task in tasks]
@@ -80,7 +80,11 @@ class Simulations:
         calls = ((task,) for _, task in left)
         given = enumerate(task for _, task in left) if self._executor is None else answers(self._executor, calls)
         for done, (number, answer) in enumerate(given, start=1):
-            content = answer()
+            try:
+                content = answer()
+            except SimulationStopped:
+                self._known[left[number][0]] = None
+                continue
             if not isinstance(content, bytes) or len(content) > MOST_BYTES:
                 raise ClusterError("a worker sent no arrays, or too many")
             self._keep(left[number][0], content)

@@ -30,6 +30,11 @@ MOST = 20
 """Parameters, and experiments, that a study may have."""
 ROBOT = Path(__file__).parent.parent / "data" / "identify_robot.toml"
 """The study of the robot that annelid's data are of."""
+EXAMPLES = {
+    "robot": (ROBOT.name, "tube_tensile.csv", "segment_load_frame.csv"),
+    "walk": ("identify_walk.toml", "walk.csv", "walk.map.toml"),
+}
+"""Studies that come with annelid, each with its data, in the folder of the data."""
 
 
 class Prior(Section):

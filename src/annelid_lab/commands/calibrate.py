@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from shutil import copyfile
+from typing import Annotated, Literal
 
 import typer
 
@@ -17,9 +18,9 @@ from annelid.cli import (
     complain,
     kept_runs,
     overrides_of,
+    print_paths,
     print_results,
     refuse_existing,
-    refuse_json,
 )
 
 
@@ -29,7 +30,7 @@ def calibrate_command(
         Path | None,
         typer.Argument(
             metavar="[STUDY.toml]",
-            help="Worm, parameters and experiments; --example prints one.  [default: the robot of annelid's data]",
+            help="Worm, parameters and experiments; --example writes one.  [default: the robot of annelid's data]",
         ),
     ] = None,
     output: Output = Path("calibration"),
@@ -40,8 +41,9 @@ def calibrate_command(
     ] = None,
     jobs: Jobs = None,
     example: Annotated[
-        bool, typer.Option("--example", help="Print the study of the authors' robot, as a start for your own.")
-    ] = False,
+        Literal["walk", "robot"] | None,
+        typer.Option(help="Write a study with its data into the output folder: a walk's log, or the authors' robot."),
+    ] = None,
     quiet: Quiet = False,
     force: Force = False,
 ) -> None:
@@ -56,25 +58,28 @@ def calibrate_command(
     ring-down   a strand that is bent, released, and vibrates
     walk        the log of a walking robot, with a map as for annelid compare
 
-    Writes calibration.json, with values, 95 % intervals, correlations and the size of the model error; calibration.png
-    and .svg; and calibrated.toml, the fitted worm. Simulated experiments are kept, so the same command continues after
-    an interruption. A study with a load frame takes some minutes. Without a study, the tube and one segment of the
-    authors' robot are fitted.
+    Writes calibration.json: values, 95 % intervals, correlations and the size of the model error. It warns where the
+    data do not determine a parameter, or the model lacks something. Also writes calibration.png and .svg, and
+    calibrated.toml, the fitted worm. Simulated experiments are kept, so the same command continues after an
+    interruption. A study with a walk or a load frame takes some minutes. Without a study, the tube and one segment of
+    the authors' robot are fitted.
 
     \b
-    annelid calibrate --example > study.toml
-    annelid calibrate study.toml -o mine
+    annelid calibrate --example walk -o mine
+    annelid calibrate mine/study.toml -o mine
     annelid calibrate --free young_modulus --free spring_rate
     annelid run mine/calibrated.toml --uncertainty 8 \\
         --uncertainty-from mine/calibration.json
     """
     from annelid_lab.calibration.report import REPORT, identify, tables, write_identified
     from annelid_lab.calibration.simulations import Simulations
-    from annelid_lab.calibration.study import ROBOT, load_identify_study
+    from annelid_lab.calibration.study import EXAMPLES, ROBOT, load_identify_study
 
-    refuse_json(example, "--example")
-    if example:
-        typer.echo(ROBOT.read_text(encoding="utf-8"), nl=False)
+    if example is not None:
+        refuse_existing(output / "study.toml", force)
+        output.mkdir(parents=True, exist_ok=True)
+        files = dict(zip(EXAMPLES[example], ("study.toml", *EXAMPLES[example][1:]), strict=True))
+        print_paths([copyfile(ROBOT.with_name(source), output / name) for source, name in files.items()])
         return
     source = ROBOT if study is None else study
     loaded = load_identify_study(source)
@@ -84,6 +89,6 @@ def calibrate_command(
         refuse_existing(output / REPORT, force)
         simulations = Simulations(store.folder, store.executor, store.progress)
         found = identify(loaded, source.parent, simulations, lambda note: complain(f"note: {note}"))
-    for sentence in found.intervals.confused:
-        complain(f"note: {sentence}")
+    for sentence in found.warnings:
+        complain(f"warning: {sentence}")
     print_results(write_identified(found, output), *tables(found), quiet=quiet)

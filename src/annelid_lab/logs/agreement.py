@@ -125,7 +125,7 @@ def compare_series(series: Mapping[str, tuple[Array, Array, str]], log: Measured
         time_s, values, units[name] = series[name]
         kept = time_s >= from_s
         simulated[name] = time_s[kept], values[kept]
-        _refuse_unlike(name, log, values, units[name])
+        refuse_unlike(name, log, values, units[name])
     steps = [float(np.median(np.diff(time_s))) for time_s, _ in simulated.values() if len(time_s) > 1]
     span_s = max((float(np.ptp(time_s)) for time_s, _ in simulated.values() if len(time_s)), default=0.0)
     log_step_s, log_span_s = float(np.median(np.diff(log.time_s))), float(np.ptp(log.time_s))
@@ -279,7 +279,7 @@ def _sides(run: Run) -> dict[str, list[int]]:
     return {"left": places[:, 0].tolist(), "right": places[:, 1].tolist()}
 
 
-def _refuse_unlike(name: str, log: Measured, values: Array, unit: str) -> None:
+def refuse_unlike(name: str, log: Measured, values: Array, unit: str) -> None:
     """Refuses a column in another unit than its signal's, or off it by orders of magnitude."""
     column = log.columns[name]
     if column.scale is None and (kind := log.kinds[name]) != unit:

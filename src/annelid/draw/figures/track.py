@@ -24,6 +24,7 @@ FRONT = "#c2410c"
 WALL = "#bf784d"
 INK = "0.15"
 _EDGE_IN = 1.3  # room that labels take beside the plot, inches
+_HEIGHTS_IN = (2.6, 8.5)  # least and largest of the figure
 
 
 def track_figure(run: Run, path: str | Path) -> Path:
@@ -44,10 +45,12 @@ def track_figure(run: Run, path: str | Path) -> Path:
     """
     path = plot_path(path)
     track = track_of(run)
-    with canvas(_height_in(track, run.config)) as figure:
+    with canvas(_HEIGHTS_IN[0]) as figure:
         axes = figure.subplots()
         _draw_track(axes, track)
         _draw_marks(axes, run.config)
+        height = (WIDTH_IN - _EDGE_IN) * axes.dataLim.height / axes.dataLim.width + _EDGE_IN
+        figure.set_figheight(float(np.clip(height, *_HEIGHTS_IN)))
         panel_title(axes, f"{run.config.name}: track of {track.time_s[-1]:g} s, seen from above")
         figure.legend(*axes.get_legend_handles_labels(), loc="outside lower right", ncols=4)
         return save(figure, path)
@@ -89,16 +92,6 @@ def _draw_marks(axes: Axes, config: RunConfig) -> None:
         label = "_" * (number > 1) + "waypoint, reached within the circle"
         axes.add_patch(Circle(point, goals.reach_m, fill=False, color="0.6", linestyle=":", label=label))
         axes.annotate(str(number), point, fontsize=8, color="0.3", ha="center", va="center")
-
-
-def _height_in(track: Track, config: RunConfig) -> float:
-    """Height at which the plot fills the width of a page at equal scales, within reason."""
-    points = track.crossing_m[..., :2].reshape(-1, 2)
-    posts = config.arena.walls.posts if config.arena is not None else ()
-    for places in (_goals(config).points_m, [post[:2] for post in posts]):
-        points = np.concatenate([points, np.reshape(places, (-1, 2))])
-    width, height = np.ptp(points, axis=0)
-    return float(np.clip((WIDTH_IN - _EDGE_IN) * height / width + _EDGE_IN, 2.6, 8.5))
 
 
 def _goals(config: RunConfig) -> Goals:

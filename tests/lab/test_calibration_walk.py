@@ -1,0 +1,97 @@
+"""Identification from a walk, of a small machine that switches as a worm does, one step of its clock at a time."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from annelid.body.worm import WormBody
+from annelid.config import RunConfig
+from annelid_lab.calibration.kinds.walk import WalkTest
+from annelid_lab.calibration.report import Identified, identify
+from annelid_lab.calibration.simulations import Simulations
+from annelid_lab.calibration.study import load_identify_study
+
+STEP_S, DURATION_S = 0.006, 6.0
+TRUTH = {"young_modulus": 0.22e9, "damping_time": 0.1}
+
+
+def walk(young: float, damping: float, stiffer: tuple[float, ...] = (1.0, 1.0, 1.0)) -> NDArray[np.float64]:
+    """Three masses on springs, pulled in turn; the next one is pulled when the last is short. Lengths, m."""
+    stiffness = young / 0.22e9 * np.array(stiffer)
+    square, pull = 16.0 * stiffness, 0.06 / stiffness
+    length, speed, active = np.full(3, 0.06), np.zeros(3), 0
+    lengths = np.empty((round(DURATION_S / STEP_S) + 1, 3))
+    for row in lengths:
+        row[:] = length
+        active = (active + (length[active] < 0.03)) % 3
+        rest = 0.06 - pull * (np.arange(3) == active)
+        speed = (speed + STEP_S * square * (rest - length)) / (1.0 + STEP_S * square * (damping + STEP_S))
+        length = length + STEP_S * speed
+    return lengths.T
+
+
+def stand_in(test: WalkTest, config: RunConfig) -> dict[str, NDArray[Any]]:
+    body = config.body
+    assert isinstance(body, WormBody)
+    lengths = walk(body.strands.one_number("young_modulus_Pa"), body.strands.damping_time_s)
+    found: dict[str, NDArray[Any]] = {}
+    for i, values in enumerate(lengths):
+        found |= {f"time_{i}": STEP_S * np.arange(len(values)), f"value_{i}": values, f"unit_{i}": np.array("m")}
+    return found
+
+
+def identified(folder: Path, lengths: NDArray[np.float64], span_s: float = 5.4, **more: Any) -> Identified:
+    rng, clock = np.random.default_rng(1), np.arange(0.0, span_s, 0.02)
+    columns = {"t_s": clock}
+    for i, values in enumerate(lengths):
+        own = np.interp(clock + 0.5, STEP_S * np.arange(len(values)), values)
+        columns[f"s{i + 1}_mm"] = 1e3 * (own + rng.normal(0.0, 5e-4, len(clock)))
+    table, head = np.column_stack([*columns.values()]), ",".join(columns)
+    np.savetxt(folder / "robot.csv", table, delimiter=",", header=head, comments="")
+    rows = [f's{i}_mm = "stretch_length[{i}, mean]"' for i in (1, 2, 3)]
+    (folder / "map.toml").write_text("\n".join(['time = "t_s"', "[map]", *rows]))
+    study = {
+        "preset": "riddle2023-rods",
+        "set": {"duration_s": DURATION_S},
+        "parameters": {"young_modulus": {"start": 3e8}, "damping_time": {"start": 0.145}, **more},
+        "experiments": [{"kind": "walk", "name": "walk", "data": "robot.csv", "map": "map.toml"}],
+    }
+    return identify(load_identify_study(study), folder, Simulations())
+
+
+@pytest.fixture(autouse=True)
+def _machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(WalkTest, "run", stand_in)
+
+
+def test_a_walk_that_switches_in_steps_gives_the_truth_and_intervals_that_hold_it(tmp_path: Path) -> None:
+    found = identified(tmp_path, walk(TRUTH["young_modulus"], TRUTH["damping_time"]))
+    assert found.fit.values == pytest.approx(TRUTH, rel=0.01)
+    truth, ends = np.array([*TRUTH.values()]), found.intervals.profile
+    assert ((ends[:, 0] < truth) & (truth < ends[:, 1])).all()
+    assert (ends[:, 1] / ends[:, 0] < 1.05).all()
+    (part,) = found.fit.parts
+    assert part.data.unit == "m"
+    tried = [found.fit.emulator.model.measured(one)[0] for one in found.fit.emulator.model.tried]
+    best = min(float(np.sqrt(((one - part.data.values) ** 2).mean())) for one in tried)
+    assert part.rms < 1.05 * best, "no worm that was computed is much better than the one that is kept"
+    assert part.numbers["lag_s"] == pytest.approx(0.5, abs=0.005)
+    assert found.fit.n_tests < 60
+    assert not found.warnings
+
+
+def test_a_segment_of_other_stiffness_is_noticed(tmp_path: Path) -> None:
+    found = identified(tmp_path, walk(TRUTH["young_modulus"], TRUTH["damping_time"], stiffer=(1.0, 1.2, 1.0)))
+    assert any("the model lacks something" in sentence for sentence in found.warnings)
+
+
+def test_half_a_cycle_and_a_parameter_that_moves_nothing_are_noticed(tmp_path: Path) -> None:
+    nothing = {"start": 0.5, "low": 0.1, "high": 2.0, "fields": {"arena.friction": 1.0}}
+    found = identified(tmp_path, walk(TRUTH["young_modulus"], TRUTH["damping_time"]), span_s=1.2, floor=nothing)
+    assert any("cycles of" in sentence for sentence in found.warnings)
+    assert any("do not determine floor" in sentence for sentence in found.warnings)

@@ -76,8 +76,7 @@ class StrandBodies:
 
     def curves(self, data: mujoco.MjData) -> tuple[Array, Array]:
         """Returns the strands of a located posture, as `strand_curves`."""
-        turn = data.xmat[self.ids].reshape(-1, 3, 3)
-        vertices = data.xpos[self.ids] + np.einsum("vij,vj->vi", turn, self._place)
+        vertices = data.xpos[self.ids] + np.einsum("vij,vj->vi", data.xmat[self.ids].reshape(-1, 3, 3), self._place)
         return strand_curves(vertices.reshape(self._geometry.vertices_m.shape), self._geometry)
 
 

@@ -58,11 +58,11 @@ def calibrate_command(
     ring-down   a strand that is bent, released, and vibrates
     walk        the log of a walking robot, with a map as for annelid compare
 
-    Writes calibration.json, with values, 95 % intervals, correlations, the size of the model error, and warnings where
-    the data do not determine a parameter or the model lacks something; calibration.png and .svg; and calibrated.toml,
-    the fitted worm. Simulated experiments are kept, so the same command continues after an interruption. A study with a
-    walk or a load frame takes some minutes. Without a study, the tube and one segment of the
-    authors' robot are fitted.
+    Writes calibration.json: values, 95 % intervals, correlations and the size of the model error. It warns where the
+    data do not determine a parameter, or the model lacks something. Also writes calibration.png and .svg, and
+    calibrated.toml, the fitted worm. Simulated experiments are kept, so the same command continues after an
+    interruption. A study with a walk or a load frame takes some minutes. Without a study, the tube and one segment of
+    the authors' robot are fitted.
 
     \b
     annelid calibrate --example walk -o mine

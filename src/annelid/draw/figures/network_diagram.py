@@ -80,12 +80,12 @@ def network_figure(network: Network, path: str | Path) -> Path:
 
 
 def network_svg(network: Network) -> str:
-    """Returns the drawing of `network_figure`, without its key, as the SVG element of a web page."""
+    """Returns the drawing of `network_figure` in black, without its key, as the SVG element of a web page."""
     import matplotlib
 
     text = StringIO()
     nothing = dict.fromkeys(("Creator", "Date", "Format", "Type"))
-    with _drawn(network) as (figure, _), matplotlib.rc_context({"svg.fonttype": "none"}):
+    with _drawn(network, black=True) as (figure, _), matplotlib.rc_context({"svg.fonttype": "none"}):
         figure.savefig(text, format="svg", bbox_inches="tight", transparent=True, metadata=nothing)
     return text.getvalue()[text.getvalue().index("<svg") :]
 
@@ -281,8 +281,8 @@ def _cosines(one: Sequence[complex] | Path2D, other: complex) -> NDArray[np.floa
 
 
 @contextmanager
-def _drawn(network: Network, n_panels: int = 0) -> Iterator[tuple[Figure, list[Axes]]]:
-    """Gives a figure with the network, whose unit fits the width of a page, and empty panels below it."""
+def _drawn(network: Network, n_panels: int = 0, *, black: bool = False) -> Iterator[tuple[Figure, list[Axes]]]:
+    """Gives a figure with the network, in colours or in black, in the width of a page, and empty panels below it."""
     places = place_neurons(network)
     routes = list(route_connections(network, places))
     with canvas(1.0) as figure:
@@ -300,7 +300,7 @@ def _drawn(network: Network, n_panels: int = 0) -> Iterator[tuple[Figure, list[A
         top.get_gridspec().set_height_ratios(heights)
         figure.set_size_inches(max(unit_in * box.width, WIDTH_IN if panels else 0.0), sum(heights))
         top.set(xlim=(box.x0, box.x1), ylim=(box.y0, box.y1))
-        _draw_neurons(top, network, places, unit_in)
+        _draw_neurons(top, network, places, unit_in, {} if black else looks_of(network))
         for axes in panels[:-1]:
             axes.sharex(panels[-1])
             axes.sharey(panels[-1])
@@ -365,13 +365,14 @@ def _draw_ends(axes: Axes, network: Network, places: dict[str, complex], routes:
             )
 
 
-def _draw_neurons(axes: Axes, network: Network, places: dict[str, complex], unit_in: float) -> None:
-    """Draws circles in the colours of the neurons, with a double rim for gated channels, and their labels."""
+def _draw_neurons(axes: Axes, network: Network, places: dict[str, complex], unit_in: float, looks: Any) -> None:
+    """Draws circles in the colours of the labels' looks, with a double rim for gated channels, and the labels."""
     from matplotlib.patches import Circle
 
-    labels, looks = labels_of(network), looks_of(network)
+    labels = labels_of(network)
     for number, (name, place) in enumerate(places.items()):
-        neuron, center, color = network.neurons[name], (place.real, place.imag), looks[labels[name]]["color"]
+        neuron, center = network.neurons[name], (place.real, place.imag)
+        color = looks[labels[name]]["color"] if looks else "black"
         radii = (_RADIUS, 0.82 * _RADIUS) if neuron.channels else (_RADIUS,)
         for radius, width, face in zip(radii, (2.2, 1.2), ("white", "none"), strict=False):
             gid = f"neuron-{number}" if radius == _RADIUS else None

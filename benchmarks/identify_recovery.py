@@ -2,7 +2,7 @@
 
 Each robot is a coarse worm of drawn parameters. A tensile test of its tube, a loop of its load frame and a ring-down
 of a strand are made, with noise, a slow error that the model does not know, rows that are missing and cells that are
-empty. Run ``python benchmarks/identify_recovery.py RESULTS.csv``; half an hour of one core for all 50. It continues
+empty. Run ``python benchmarks/identify_recovery.py RESULTS.csv``; two hours of one core for all 50. It continues
 where it was stopped.
 """
 
@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 import csv
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -143,14 +143,14 @@ def rows_of(number: int) -> list[list[object]]:
     ]
 
 
-def summary(path: Path) -> list[list[object]]:
+def summary(path: Path, drawn: Iterable[str] = DRAWN) -> list[list[object]]:
     """How often intervals hold the truth, and the bias over the mean width of an interval, by parameter."""
     with path.open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     found: list[list[object]] = []
-    for name in (*DRAWN, "all"):
+    for name in (*drawn, "all"):
         mine = [row for row in rows if name in (row["parameter"], "all")]
-        ends = {head: np.array([float(row[head]) for row in mine]) for head in HEADS[2:]}
+        ends = {head: np.array([float(row[head]) for row in mine]) for head in HEADS[2:6]}
         truth = ends["truth"]
         held = np.mean((ends["low"] <= truth) & (truth <= ends["high"]))
         width = np.log(ends["high"] / ends["low"])
@@ -179,4 +179,6 @@ def main(path: Path, robots: int = ROBOTS) -> None:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser()
     parser.add_argument("csv", type=Path, help="file for the numbers, which goes on where it ended")
-    main(parser.parse_args().csv)
+    parser.add_argument("--robots", type=int, default=ROBOTS, help="how many robots")
+    given = parser.parse_args()
+    main(given.csv, given.robots)

@@ -138,10 +138,13 @@ BENCHMARKS = sorted((one for one in NAMED if starts_with(one.words, ("python", "
 """Benchmarks that pages name, with their arguments."""
 
 BENCHMARKS_NEED = {
+    # They take hours; tests/lab/test_calibration.py identifies two of the robots.
+    "identify_recovery": False,
+    "identify_walks": False,
     "instructions": shutil.which("valgrind"),
     "firmware": shutil.which("cc") and shutil.which("arm-none-eabi-gcc") and shutil.which("qemu-system-arm"),
 }
-"""What is not installed with the tests."""
+"""Benchmarks that run only where something is installed, or never."""
 
 READERS_FILES = {"mine.toml": 'extends = "riddle2023-rods"\n', "mine.csv": "mm,N\n0,0\n1,1\n"}
 """Files of the reader's own that a page takes for granted."""
@@ -329,7 +332,7 @@ def test_the_names_that_a_benchmark_imports_are_there(
 def test_a_benchmark_runs(command: Command, tmp_path: Path) -> None:
     script = ROOT / command.words[1]
     if not BENCHMARKS_NEED.get(script.stem, True):
-        pytest.skip(f"{script.name} needs a program or package that is not installed")
+        pytest.skip(f"{script.name} needs hours, or what is not installed")
     answer = subprocess.run(
         [sys.executable, script, *command.words[2:]],
         cwd=tmp_path,

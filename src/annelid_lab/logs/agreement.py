@@ -132,7 +132,8 @@ def compare_series(series: Mapping[str, tuple[Array, Array, str]], log: Measured
     step_s = max([*steps, log_step_s / 4])
     if min(span_s, log_span_s) < 20 * step_s:
         raise ConfigError(
-            f"too short to compare: the run has {span_s:.3g} s from {from_s:g} s on, the log {log_span_s:.3g} s"
+            f"too short to compare: the run has {span_s:.3g} s from {from_s:g} s on, the log {log_span_s:.3g} s; "
+            "is time_unit of the map right?"
         )
     if max(span_s, log_span_s) > MOST_SAMPLES * step_s:
         raise ConfigError(

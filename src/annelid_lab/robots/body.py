@@ -144,9 +144,13 @@ class MjcfBody(BodyKind):
         known = {name for path in ("tendon/*", "sensor/*", _JOINTS) for name in names_in(self.xml, ROBOT, path)}
         for name in (name for names in self.sensor_names for name in names):
             if name not in known:
+                pattern = next(
+                    (re.sub(r"\d+", PLACE, one, count=1) for one in sorted(known) if re.search(r"\d", one)), ""
+                )
+                remedy = f": write sensors = [{toml_value(pattern)}] under [body]" if pattern else ""
                 raise ValueError(
                     f"body.sensors: the file has no tendon, joint or sensor named {name!r}; it has "
-                    f"{listed(sorted(known)) or 'none'}"
+                    f"{listed(sorted(known)) or 'none'}{remedy}"
                 )
         try:
             _ = self.own_model

@@ -1,0 +1,313 @@
+"""Trains the network of controller kind `policy` by reinforcement learning: soft actor-critic of Stable-Baselines3.
+
+An episode is one training draw of one of the tasks `TASKS`, in the Gymnasium environment of the body, which is coarser
+than the benchmark's own runs. The reward is the way that the worm comes. The first episodes are waves by the clock, of
+random period, shape and direction, so that the learner sees what moves a worm. Training goes piece by piece: each has
+its own random numbers and ends in a checkpoint, so an interrupted training ends with the same bits as another.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import shutil
+from collections.abc import Iterator, Mapping
+from dataclasses import astuple, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from annelid.errors import MissingDependency
+
+try:
+    import torch
+    from stable_baselines3 import SAC
+    from stable_baselines3.common.logger import Logger
+    from stable_baselines3.common.vec_env import DummyVecEnv
+except ImportError:
+    raise MissingDependency(
+        "training needs Stable-Baselines3: install it with  pip install 'annelid[learn]'"
+    ) from None
+
+import gymnasium
+from gymnasium.spaces import Box
+from numpy.typing import NDArray
+
+from annelid.draw import canvas, save_both
+from annelid.environments import WormEnv
+from annelid.experiment import StudyProgress
+from annelid.output import write_csv, write_text
+from annelid.protocols import Array
+from annelid_studies.challenge.policy import LARGEST, STRETCH_M, Policy, inputs
+from annelid_studies.challenge.tasks import FIRST_TEST_SEED, Entrant, all_tasks
+
+TASKS = ("level", "friction", "slope")
+SEED = 0
+EVALUATED = 0
+"""Training seed of the draws on which every piece's network is judged."""
+INTERVAL_S = {"three": 0.1, "six": 0.2}
+EPISODE_STEPS = 80
+WAVES_EPISODES = 36
+PERIODS = (5.0, 20.0)
+"""Range of the waves' periods, in intervals."""
+PIECE = 2000
+"""Environment steps of a piece."""
+HIDDEN = 16
+REWARD = 10.0
+"""What a body length per second is rewarded with."""
+DIGITS = 5
+"""Significant digits of weights."""
+OPTIONS: Mapping[str, Any] = {
+    "learning_rate": 1e-3,
+    "learning_starts": 0,
+    "batch_size": 256,
+    "tau": 0.02,
+    "gamma": 0.97,
+    "train_freq": 8,
+    "gradient_steps": 8,
+    "ent_coef": "auto_0.1",
+}
+"""Of `stable_baselines3.SAC`."""
+CRITIC = (64, 64)
+ARRAYS = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """What a piece of training led to."""
+
+    steps: int  # of the environment, so far
+    training_m_per_s: float  # mean speed of its episodes
+    level_m_per_s: float  # speed of the network at its end, without noise, on the draw of seed `EVALUATED`
+    friction_m_per_s: float
+    slope_m_per_s: float
+
+    @property
+    def speed_m_per_s(self) -> float:
+        """Mean over tasks, by which the best network is chosen."""
+        return (self.level_m_per_s + self.friction_m_per_s + self.slope_m_per_s) / len(TASKS)
+
+
+class PolicyEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
+    """A body of the benchmark that senses and does what a policy does, with a training draw for each episode.
+
+    Attributes:
+        speeds_m_per_s: Mean speed of every episode that has ended.
+    """
+
+    def __init__(self, body: str) -> None:
+        """Takes the name of the body."""
+        self._body, self._interval_s = all_tasks().bodies[body], INTERVAL_S[body]
+        self.speeds_m_per_s: list[float] = []
+        self.begin(TASKS[0], EVALUATED)
+        n = self.n_segments = self._env.worm.n_segments
+        self.touch_N = float(f"{self._env.worm.total_mass_kg * 9.81 / n:.2g}")
+        self.observation_space = Box(-LARGEST, LARGEST, (3 * n,), np.float32)
+        self.action_space = Box(-1.0, 1.0, (n,), np.float32)
+
+    def begin(self, task: str, seed: int) -> None:
+        """Begins an episode of a draw, with a relaxed worm."""
+        shared = {**all_tasks().set, **all_tasks().tasks[task].set, **all_tasks().drawn(task, seed)}
+        arena = {field: value for field, value in shared.items() if field.startswith("arena.")}
+        self._env = WormEnv(
+            self._body.preset,
+            arena,
+            interval_s=self._interval_s,
+            episode_s=EPISODE_STEPS * self._interval_s,
+            weights={"progress": REWARD, "effort": 0.0, "slip": 0.0, "failure": REWARD},
+            start_activation=0.0,
+        )
+        self._env.reset()
+        self._last = np.zeros(self._env.worm.n_segments)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+        """Begins an episode of a task and a training seed that are drawn."""
+        super().reset(seed=seed)
+        self.begin(str(self.np_random.choice(TASKS)), int(self.np_random.integers(FIRST_TEST_SEED)))
+        return self.read().astype(np.float32), {}
+
+    def read(self) -> Array:
+        """Returns what a policy reads now."""
+        return inputs(self._env.sensation, self._last, STRETCH_M, self.touch_N)
+
+    def step(self, action: Array) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
+        """Goes on by one interval; actions from -1 to 1 are activations from 0 to 1."""
+        self._last = np.clip(0.5 * (1.0 + np.asarray(action, dtype=float)), 0.0, 1.0)
+        asked = self._last.repeat(self._env.worm.n_muscles // self.n_segments)
+        _, reward, terminated, truncated, info = self._env.step(asked)
+        if terminated or truncated:
+            self.speeds_m_per_s.append(info["travel"] * self._env.worm.geometry.length_m / info["time_s"])
+        return self.read().astype(np.float32), float(reward), terminated, truncated, {}
+
+    def speed_m_per_s(self, policy: Policy, task: str, seed: int) -> float:
+        """Returns how fast a policy is on a draw; 0 where the simulation breaks down."""
+        self.begin(task, seed)
+        over = late = False
+        while not (over or late):
+            *_, over, late, _ = self.step(2.0 * policy.activation(self.read()) - 1.0)
+        reached = self.speeds_m_per_s.pop()
+        return 0.0 if over else reached
+
+
+class Learner:
+    """The training of a policy for one body, kept in a folder.
+
+    Attributes:
+        pieces: What was learned so far.
+        best: Fields of the best network so far.
+    """
+
+    def __init__(self, body: str, folder: Path) -> None:
+        """Begins, or goes on from the checkpoint in the folder."""
+        torch.set_num_threads(1)
+        self._env, self._body, self._folder = PolicyEnv(body), body, folder
+        self._envs = DummyVecEnv([lambda: self._env])
+        actor = {"net_arch": {"pi": [HIDDEN], "qf": [*CRITIC]}, "activation_fn": torch.nn.Tanh}
+        self._model = SAC("MlpPolicy", self._envs, seed=SEED, device="cpu", policy_kwargs=actor, **OPTIONS)
+        self._model.set_logger(Logger(None, []))
+        self.pieces: list[Piece] = []
+        self.best: dict[str, Any] = {}
+        if saved := _checkpoints(folder):
+            self._load(saved[-1])
+
+    def learn(self, n_steps: int) -> Iterator[Piece]:
+        """Goes on until so many steps of the environment are made; gives each piece when its checkpoint is written."""
+        if not self.pieces and self._model.num_timesteps == 0:
+            self._show_waves()
+        while (done := self._model.num_timesteps) < n_steps:
+            self._model.set_env(self._envs, force_reset=True)
+            self._model.set_random_seed(SEED + 1 + done)
+            self._env.speeds_m_per_s.clear()
+            self._model.learn(min(PIECE, n_steps - done), reset_num_timesteps=False)
+            explored = float(np.mean(self._env.speeds_m_per_s or [np.nan]))
+            fields = self.fields()
+            policy = Policy.model_validate(fields)
+            speeds = [self._env.speed_m_per_s(policy, task, EVALUATED) for task in TASKS]
+            piece = Piece(self._model.num_timesteps, *(round(speed, 6) for speed in (explored, *speeds)))
+            if all(piece.speed_m_per_s > one.speed_m_per_s for one in self.pieces):
+                self.best = fields
+            self.pieces.append(piece)
+            self._save()
+            yield piece
+
+    def fields(self) -> dict[str, Any]:
+        """Returns the fields of the present network."""
+        actor: Any = self._model.policy.actor
+        hidden, output = actor.latent_pi[0], actor.mu
+        return {
+            "interval_s": INTERVAL_S[self._body],
+            "stretch_m": STRETCH_M,
+            "touch_N": self._env.touch_N,
+            "hidden": _rounded(hidden.weight),
+            "hidden_bias": _rounded(hidden.bias),
+            "output": _rounded(output.weight),
+            "output_bias": _rounded(output.bias),
+        }
+
+    def _show_waves(self) -> None:
+        """Fills the memory with waves by the clock, and trains on them."""
+        rng, env, n = np.random.default_rng(SEED), self._env, self._env.n_segments
+        for episode in range(WAVES_EPISODES):
+            before, _ = env.reset(seed=SEED if episode == 0 else None)
+            period = PERIODS[0] * (PERIODS[1] / PERIODS[0]) ** rng.random()
+            start, back, sharpness, bias = rng.random(), rng.choice((-1, 1)), rng.uniform(1.0, 6.0), rng.uniform(-1, 1)
+            over = late = False
+            for step in range(EPISODE_STEPS):
+                turn = start + step / period - back * np.arange(n) / n
+                wave = np.tanh(sharpness * np.cos(2.0 * np.pi * turn) + bias) + rng.normal(0.0, 0.1, n)
+                action = np.clip(wave, -0.999, 0.999).astype(np.float32)
+                after, reward, over, late, _ = env.step(action)
+                self._model.replay_buffer.add(
+                    before[None],
+                    after[None],
+                    action[None],
+                    np.array([reward]),
+                    np.array([over or late]),
+                    [{"TimeLimit.truncated": late}],
+                )
+                before = after
+                if over:
+                    break
+        self._model.train(WAVES_EPISODES * EPISODE_STEPS // 2, batch_size=OPTIONS["batch_size"])
+
+    def _save(self) -> None:
+        """Writes a checkpoint and removes those before it; a folder that is there is whole."""
+        before = _checkpoints(self._folder)
+        draft, memory = self._folder / "draft", self._model.replay_buffer
+        shutil.rmtree(draft, ignore_errors=True)
+        draft.mkdir(parents=True)
+        parameters = {"parameters": self._model.get_parameters(), "log_ent_coef": self._model.log_ent_coef}
+        torch.save(parameters, draft / "parameters.pt")
+        rows = memory.buffer_size if memory.full else memory.pos
+        np.savez(draft / "memory.npz", **{name: getattr(memory, name)[:rows] for name in ARRAYS})
+        write_csv(draft / "curve.csv", Piece.__slots__, map(astuple, self.pieces))
+        write_text(draft / "best.json", json.dumps(self.best))
+        draft.rename(self._folder / f"{self.pieces[-1].steps:09d}")
+        for folder in before:
+            shutil.rmtree(folder)
+
+    def _load(self, folder: Path) -> None:
+        # Neither runs code that a file holds.
+        saved = torch.load(folder / "parameters.pt", weights_only=True)
+        self._model.set_parameters(saved["parameters"])
+        self._model.log_ent_coef.data.copy_(saved["log_ent_coef"].data)
+        memory = self._model.replay_buffer
+        with np.load(folder / "memory.npz", allow_pickle=False) as arrays:
+            for name in ARRAYS:
+                getattr(memory, name)[: len(arrays[name])] = arrays[name]
+            memory.pos, memory.full = len(arrays["dones"]), False
+        with (folder / "curve.csv").open(newline="", encoding="utf-8") as file:
+            self.pieces = [Piece(int(row[0]), *map(float, row[1:])) for row in list(csv.reader(file))[1:]]
+        self.best = json.loads((folder / "best.json").read_text(encoding="utf-8"))
+        self._model.num_timesteps = self.pieces[-1].steps
+
+
+def _checkpoints(folder: Path) -> list[Path]:
+    return sorted(folder.glob("[0-9]*"))
+
+
+def _rounded(weights: Any) -> list[Any]:
+    def short(value: Any) -> Any:
+        return [short(each) for each in value] if isinstance(value, list) else float(f"{value:.{DIGITS}g}")
+
+    return short(weights.detach().numpy().tolist())
+
+
+def train(bodies: list[str], n_steps: int, folder: Path, progress: StudyProgress | None = None) -> list[Path]:
+    """Trains a policy for each body, and writes it as an entrant.
+
+    Args:
+        bodies: Names of the bodies; none for all.
+        n_steps: Steps of the environment, beside the waves at the beginning.
+        folder: Where checkpoints are kept, and where to write ``policy.toml`` and each body's learning curve. Called
+            again, it goes on from the checkpoints.
+        progress: Told how far it is.
+    """
+    from annelid_studies.challenge.tuning import write_entrants
+
+    on, written = {}, []
+    for body in bodies or all_tasks().bodies:
+        learner = Learner(body, folder / "training" / body)
+        for piece in learner.learn(n_steps):
+            if progress is not None:
+                progress(f"training {body}", piece.steps, n_steps, piece.steps / n_steps)
+        on[body] = {f"controller.{field}": value for field, value in learner.best.items()}
+        written += [write_csv(folder / f"{body}.csv", Piece.__slots__, map(astuple, learner.pieces))]
+        written += [_curve(learner.pieces, folder / body)]
+    summary = "a small network trained by reinforcement learning"
+    entrant = Entrant(summary=summary, controller={"kind": "policy"}, on=on)
+    return [write_entrants({"policy": entrant}, folder / "policy.toml"), *written]
+
+
+def _curve(pieces: list[Piece], stem: Path) -> Path:
+    with canvas(2.6) as figure:
+        axes = figure.subplots(subplot_kw={"xlabel": "steps of the environment", "ylabel": "speed (cm/s)"})
+        steps = [one.steps for one in pieces]
+        axes.plot(steps, [100 * one.training_m_per_s for one in pieces], color="0.6", label="while it learns")
+        for task in TASKS:
+            axes.plot(steps, [100 * getattr(one, f"{task}_m_per_s") for one in pieces], label=f"learned, {task}")
+        axes.legend()
+        return save_both(figure, stem)

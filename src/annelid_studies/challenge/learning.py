@@ -26,9 +26,7 @@ try:
     from stable_baselines3.common.logger import Logger
     from stable_baselines3.common.vec_env import DummyVecEnv
 except ImportError:
-    raise MissingDependency(
-        "training needs Stable-Baselines3: install it with  pip install 'annelid[learn]'"
-    ) from None
+    raise MissingDependency("training needs Stable-Baselines3: install it with  pip install 'annelid[learn]'") from None
 
 import gymnasium
 from gymnasium.spaces import Box

@@ -10,7 +10,6 @@ from pydantic import Field
 from annelid.clock import SLACK_S
 from annelid.config import ControllerKind, Positive
 from annelid.control import SegmentController, lengthening_m
-from annelid.errors import ConfigError
 from annelid.protocols import SIDES, Array, Plant, Sensation
 
 if TYPE_CHECKING:
@@ -38,9 +37,7 @@ def inputs(sensation: Sensation, last: Array, stretch_m: float, touch_N: float) 
         1, each for all segments, none larger than `LARGEST`.
     """
     longer = lengthening_m(sensation.stretch_m, sensation.rest_stretch_m) / stretch_m
-    return np.clip(
-        np.concatenate([longer, sensation.touch_N[:, BELLY] / touch_N, 2.0 * last - 1.0]), -LARGEST, LARGEST
-    )
+    return np.clip(np.concatenate([longer, sensation.touch_N[:, BELLY] / touch_N, 2.0 * last - 1.0]), -LARGEST, LARGEST)
 
 
 class Policy(ControllerKind):
@@ -64,7 +61,9 @@ class Policy(ControllerKind):
         """Checks that the body has a skin, that the weights fit it, and the interval the control timestep."""
         n, n_hidden = config.body.n_segments, len(self.hidden_bias)
         if not config.body.has_skin:
-            raise ValueError("controller.kind = 'policy' senses touch, which this body does not: use body.kind = 'worm'")
+            raise ValueError(
+                "controller.kind = 'policy' senses touch, which this body does not: use body.kind = 'worm'"
+            )
         if not n_hidden:
             raise ValueError("controller.hidden_bias is empty: give a number for each hidden unit")
         for name, rows, n_rows, n_columns in (
@@ -77,7 +76,17 @@ class Policy(ControllerKind):
                 if len(row) != n_columns:
                     raise ValueError(f"controller.{name}.{i} has {len(row)} numbers: must be {n_columns}")
         if len(self.output_bias) != n:
-            raise ValueError(f"controller.output_bias has {len(self.output_bias)} numbers: must be {n}, one per segment")
+            raise ValueError(
+                f"controller.output_bias has {len(self.output_bias)} numbers: must be {n}, one per segment"
+            )
+
+        step_s = config.clock.control_timestep_s
+        steps = max(round(self.interval_s / step_s), 1)
+        if abs(steps * step_s - self.interval_s) > SLACK_S:
+            raise ValueError(
+                f"controller.interval_s = {self.interval_s:g}: must be a multiple of clock.control_timestep_s = "
+                f"{step_s:g}, for example {steps * step_s:g}"
+            )
 
     def activation(self, read: Array) -> Array:
         """Returns the activation of every segment that the network asks for, ``(n_segments,)``."""
@@ -85,18 +94,8 @@ class Policy(ControllerKind):
         return 0.5 * (1.0 + np.tanh(np.array(self.output) @ hidden + self.output_bias))
 
     def build(self, config: RunConfig, plant: Plant) -> PolicyController:
-        """Builds the controller, as `ControllerKind.build`.
-
-        Raises:
-            ConfigError: The interval is no multiple of the control timestep.
-        """
-        step_s = config.clock.control_timestep_s
-        steps = round(self.interval_s / step_s)
-        if steps < 1 or abs(steps * step_s - self.interval_s) > SLACK_S:
-            raise ConfigError(
-                f"controller.interval_s = {self.interval_s:g}: must be a multiple of clock.control_timestep_s = "
-                f"{step_s:g}, for example {max(steps, 1) * step_s:g}"
-            )
+        """Builds the controller, as `ControllerKind.build`."""
+        steps = round(self.interval_s / config.clock.control_timestep_s)
         return PolicyController(self, steps, plant.n_segments, plant.n_muscles)
 
 

@@ -13,6 +13,7 @@ import json
 import shutil
 from collections.abc import Iterator, Mapping
 from dataclasses import astuple, dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -21,16 +22,14 @@ import numpy as np
 from annelid.errors import MissingDependency
 
 try:
-    import torch
-    from stable_baselines3 import SAC
-    from stable_baselines3.common.logger import Logger
-    from stable_baselines3.common.vec_env import DummyVecEnv
+    torch: Any = import_module("torch")
+    sb3: Any = import_module("stable_baselines3")
 except ImportError:
     raise MissingDependency("training needs Stable-Baselines3: install it with  pip install 'annelid[learn]'") from None
 
 import gymnasium
 from gymnasium.spaces import Box
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from annelid.draw import canvas, save_both
 from annelid.environments import WormEnv
@@ -131,7 +130,7 @@ class PolicyEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         """Returns what a policy reads now."""
         return inputs(self._env.sensation, self._last, STRETCH_M, self.touch_N)
 
-    def step(self, action: Array) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
+    def step(self, action: ArrayLike) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """Goes on by one interval; actions from -1 to 1 are activations from 0 to 1."""
         self._last = np.clip(0.5 * (1.0 + np.asarray(action, dtype=float)), 0.0, 1.0)
         asked = self._last.repeat(self._env.worm.n_muscles // self.n_segments)
@@ -162,10 +161,10 @@ class Learner:
         """Begins, or goes on from the checkpoint in the folder."""
         torch.set_num_threads(1)
         self._env, self._body, self._folder = PolicyEnv(body), body, folder
-        self._envs = DummyVecEnv([lambda: self._env])
+        self._envs = sb3.common.vec_env.DummyVecEnv([lambda: self._env])
         actor = {"net_arch": {"pi": [HIDDEN], "qf": [*CRITIC]}, "activation_fn": torch.nn.Tanh}
-        self._model = SAC("MlpPolicy", self._envs, seed=SEED, device="cpu", policy_kwargs=actor, **OPTIONS)
-        self._model.set_logger(Logger(None, []))
+        self._model = sb3.SAC("MlpPolicy", self._envs, seed=SEED, device="cpu", policy_kwargs=actor, **OPTIONS)
+        self._model.set_logger(sb3.common.logger.Logger(None, []))
         self.pieces: list[Piece] = []
         self.best: dict[str, Any] = {}
         if saved := _checkpoints(folder):
@@ -193,7 +192,7 @@ class Learner:
 
     def fields(self) -> dict[str, Any]:
         """Returns the fields of the present network."""
-        actor: Any = self._model.policy.actor
+        actor = self._model.policy.actor
         hidden, output = actor.latent_pi[0], actor.mu
         return {
             "interval_s": INTERVAL_S[self._body],

@@ -1,9 +1,10 @@
 """Trains the network of controller kind `policy` by reinforcement learning: soft actor-critic of Stable-Baselines3.
 
 An episode is one training draw of one of the tasks `TASKS`, in the Gymnasium environment of the body, which is coarser
-than the benchmark's own runs. The reward is the way that the worm comes. The first episodes are waves by the clock, of
-random period, shape and direction, so that the learner sees what moves a worm. Training goes piece by piece: each has
-its own random numbers and ends in a checkpoint, so an interrupted training ends with the same bits as another.
+than the benchmark's own runs. The reward is the way that the worm comes. From a network at random, nothing was learned
+in the steps that a workstation makes in an hour, so the actor first imitates waves by the clock. Training goes piece by
+piece: each has its own random numbers and ends in a checkpoint, so an interrupted training ends with the same bits as
+another.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ import gymnasium
 from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 
+from annelid.control.open_loop import TimedWave
 from annelid.draw import canvas, save_both
 from annelid.environments import WormEnv
 from annelid.experiment import StudyProgress
@@ -43,27 +45,36 @@ TASKS = ("level", "friction", "slope")
 SEED = 0
 EVALUATED = 0
 """Training seed of the draws on which every piece's network is judged."""
-INTERVAL_S = {"three": 0.1, "six": 0.2}
+INTERVAL_S = {"three": 0.08, "six": 0.12}
 EPISODE_STEPS = 80
-WAVES_EPISODES = 36
-PERIODS = (5.0, 20.0)
-"""Range of the waves' periods, in intervals."""
-PIECE = 2000
+PIECE = 1000
 """Environment steps of a piece."""
+WAVES, SLOWER, WAVE_NOISE = 12, 0.3, 0.2
+"""Waves that are shown; their times are those of `WAVE` times exp(-SLOWER) .. exp(SLOWER); noise on actions."""
+WAVE = {
+    "three": {"rise_s": 0.07, "hold_s": 0.06, "fall_s": 0.1, "interval_s": 0.23},
+    "six": {"rise_s": 0.48, "hold_s": 0.18, "fall_s": 0.11, "interval_s": 0.26},
+}
+IMITATION, CRITIC_FIRST = 2000, 1000
+"""Steps of gradient descent of the actor on the best waves, and of the critic before the actor learns by itself."""
+LOG_NOISE = -1.5
+"""Logarithm of the exploration's standard deviation at the beginning, before the output's tanh."""
+INSIDE = 0.999
+"""Largest action of a wave; the learner takes the inverse of the output's tanh."""
 HIDDEN = 16
 REWARD = 10.0
 """What a body length per second is rewarded with."""
 DIGITS = 5
 """Significant digits of weights."""
 OPTIONS: Mapping[str, Any] = {
-    "learning_rate": 1e-3,
+    "learning_rate": 5e-4,
     "learning_starts": 0,
     "batch_size": 256,
     "tau": 0.02,
     "gamma": 0.97,
     "train_freq": 8,
     "gradient_steps": 8,
-    "ent_coef": "auto_0.1",
+    "ent_coef": "auto_0.01",
 }
 """Of `stable_baselines3.SAC`."""
 CRITIC = (64, 64)
@@ -173,22 +184,27 @@ class Learner:
     def learn(self, n_steps: int) -> Iterator[Piece]:
         """Goes on until so many steps of the environment are made; gives each piece when its checkpoint is written."""
         if not self.pieces and self._model.num_timesteps == 0:
-            self._show_waves()
+            self._imitate()
+            self._judge(float("nan"))
+            yield self.pieces[-1]
         while (done := self._model.num_timesteps) < n_steps:
             self._model.set_env(self._envs, force_reset=True)
             self._model.set_random_seed(SEED + 1 + done)
             self._env.speeds_m_per_s.clear()
             self._model.learn(min(PIECE, n_steps - done), reset_num_timesteps=False)
-            explored = float(np.mean(self._env.speeds_m_per_s or [np.nan]))
-            fields = self.fields()
-            policy = Policy.model_validate(fields)
-            speeds = [self._env.speed_m_per_s(policy, task, EVALUATED) for task in TASKS]
-            piece = Piece(self._model.num_timesteps, *(round(speed, 6) for speed in (explored, *speeds)))
-            if all(piece.speed_m_per_s > one.speed_m_per_s for one in self.pieces):
-                self.best = fields
-            self.pieces.append(piece)
-            self._save()
-            yield piece
+            self._judge(float(np.mean(self._env.speeds_m_per_s or [np.nan])))
+            yield self.pieces[-1]
+
+    def _judge(self, training_m_per_s: float) -> None:
+        """Ends a piece: runs the network as it is now, without noise, and writes a checkpoint."""
+        fields = self.fields()
+        policy = Policy.model_validate(fields)
+        speeds = [self._env.speed_m_per_s(policy, task, EVALUATED) for task in TASKS]
+        piece = Piece(self._model.num_timesteps, *(round(speed, 6) for speed in (training_m_per_s, *speeds)))
+        if all(piece.speed_m_per_s > one.speed_m_per_s for one in self.pieces):
+            self.best = fields
+        self.pieces.append(piece)
+        self._save()
 
     def fields(self) -> dict[str, Any]:
         """Returns the fields of the present network."""
@@ -204,31 +220,41 @@ class Learner:
             "output_bias": _rounded(output.bias),
         }
 
-    def _show_waves(self) -> None:
-        """Fills the memory with waves by the clock, and trains on them."""
+    def _imitate(self) -> None:
+        """Lets waves by the clock walk, with noise; the actor imitates the best, the critic learns from all."""
         rng, env, n = np.random.default_rng(SEED), self._env, self._env.n_segments
-        for episode in range(WAVES_EPISODES):
-            before, _ = env.reset(seed=SEED if episode == 0 else None)
-            period = PERIODS[0] * (PERIODS[1] / PERIODS[0]) ** rng.random()
-            start, back, sharpness, bias = rng.random(), rng.choice((-1, 1)), rng.uniform(1.0, 6.0), rng.uniform(-1, 1)
-            over = late = False
-            for step in range(EPISODE_STEPS):
-                turn = start + step / period - back * np.arange(n) / n
-                wave = np.tanh(sharpness * np.cos(2.0 * np.pi * turn) + bias) + rng.normal(0.0, 0.1, n)
-                action = np.clip(wave, -0.999, 0.999).astype(np.float32)
+        shown: list[tuple[float, list[tuple[Array, Array]]]] = []
+        for seed in range(WAVES):
+            slower = float(np.exp(rng.uniform(-SLOWER, SLOWER)))
+            wave = TimedWave.model_validate({name: slower * value for name, value in WAVE[self._body].items()})
+            env.begin(TASKS[0], seed)
+            before, way, asked, over, late = env.read(), 0.0, list[tuple[Array, Array]](), False, False
+            while not (over or late):
+                wanted = 2.0 * wave.activation((len(asked) + 1) * INTERVAL_S[self._body], n) - 1.0
+                action = np.clip(wanted + rng.normal(0.0, WAVE_NOISE, n), -INSIDE, INSIDE)
                 after, reward, over, late, _ = env.step(action)
-                self._model.replay_buffer.add(
-                    before[None],
-                    after[None],
-                    action[None],
-                    np.array([reward]),
-                    np.array([over or late]),
-                    [{"TimeLimit.truncated": late}],
-                )
-                before = after
-                if over:
-                    break
-        self._model.train(WAVES_EPISODES * EPISODE_STEPS // 2, batch_size=OPTIONS["batch_size"])
+                asked.append((before, wanted))
+                info = [{"TimeLimit.truncated": late}]
+                self._model.replay_buffer.add(before, after, action, np.array([reward]), np.array([over or late]), info)
+                before, way = after, way + reward
+            shown.append((way, asked))
+        best = sorted(shown, key=lambda one: -one[0])[: WAVES // 3]
+        pairs = [pair for _, asked in best for pair in asked]
+        reads, wanted = (torch.tensor(np.array(side), dtype=torch.float32) for side in zip(*pairs, strict=True))
+        actor = self._model.policy.actor
+        optimizer = torch.optim.Adam([*actor.latent_pi.parameters(), *actor.mu.parameters()], lr=0.01)
+        for _ in range(IMITATION):
+            optimizer.zero_grad()
+            asked = torch.tanh(actor.mu(actor.latent_pi(reads)))
+            torch.nn.functional.mse_loss(asked, wanted).backward()
+            optimizer.step()
+        with torch.no_grad():
+            actor.log_std.weight.zero_()
+            actor.log_std.bias.fill_(LOG_NOISE)
+        # Only the critic learns now: what it believes at first would spoil the actor.
+        actor.requires_grad_(False)
+        self._model.train(CRITIC_FIRST, batch_size=OPTIONS["batch_size"])
+        actor.requires_grad_(True)
 
     def _save(self) -> None:
         """Writes a checkpoint and removes those before it; a folder that is there is whole."""

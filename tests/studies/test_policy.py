@@ -86,9 +86,11 @@ def test_an_interrupted_training_ends_with_the_same_policy(tmp_path: Path, monke
     from annelid_studies.challenge import learning
     from annelid_studies.challenge.tasks import read_entrants
 
-    for name, value in {"PIECE": 8, "EPISODE_STEPS": 6, "WAVES_EPISODES": 2}.items():
+    short = {"PIECE": 8, "EPISODE_STEPS": 5, "WAVES": 3, "IMITATION": 20, "CRITIC_FIRST": 2}
+    for name, value in short.items():
         monkeypatch.setattr(learning, name, value)
-    next(learning.Learner("three", tmp_path / "stopped" / "training" / "three").learn(16))
+    stopped = learning.Learner("three", tmp_path / "stopped" / "training" / "three").learn(16)
+    assert [next(stopped).steps for _ in range(2)] == [0, 8]
     written = {}
     for folder in ("stopped", "whole"):
         path, curve, figure = learning.train(["three"], 16, tmp_path / folder)

@@ -46,13 +46,15 @@ SEED = 0
 EVALUATED = 0
 """Training seed of the draws on which every piece's network is judged."""
 INTERVAL_S = {"three": 0.08, "six": 0.12}
+FINER: Mapping[str, Mapping[str, Any]] = {"three": {"clock.physics_timestep_s": 0.01}}
+"""What the coarse resolution of an environment is not enough for: fast waves break it down."""
 EPISODE_STEPS = 80
 PIECE = 1000
 """Environment steps of a piece."""
 WAVES, SLOWER, WAVE_NOISE = 12, 0.3, 0.2
 """Waves that are shown; their times are those of `WAVE` times exp(-SLOWER) .. exp(SLOWER); noise on actions."""
 WAVE = {
-    "three": {"rise_s": 0.07, "hold_s": 0.06, "fall_s": 0.1, "interval_s": 0.23},
+    "three": {"rise_s": 0.16, "hold_s": 0.05, "fall_s": 0.16, "interval_s": 0.27},
     "six": {"rise_s": 0.48, "hold_s": 0.18, "fall_s": 0.11, "interval_s": 0.26},
 }
 IMITATION, CRITIC_FIRST = 2000, 1000
@@ -106,7 +108,7 @@ class PolicyEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def __init__(self, body: str) -> None:
         """Takes the name of the body."""
-        self._body, self._interval_s = all_tasks().bodies[body], INTERVAL_S[body]
+        self._name, self._body, self._interval_s = body, all_tasks().bodies[body], INTERVAL_S[body]
         self.speeds_m_per_s: list[float] = []
         self.begin(TASKS[0], EVALUATED)
         n = self.n_segments = self._env.worm.n_segments
@@ -120,7 +122,7 @@ class PolicyEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         arena = {field: value for field, value in shared.items() if field.startswith("arena.")}
         self._env = WormEnv(
             self._body.preset,
-            arena,
+            {**arena, **FINER.get(self._name, {})},
             interval_s=self._interval_s,
             episode_s=EPISODE_STEPS * self._interval_s,
             weights={"progress": REWARD, "effort": 0.0, "slip": 0.0, "failure": REWARD},

@@ -23,8 +23,8 @@ import numpy as np
 from annelid.errors import MissingDependency
 
 try:
-    torch: Any = import_module("torch")
     sb3: Any = import_module("stable_baselines3")
+    torch: Any = import_module("torch")
 except ImportError:
     raise MissingDependency("training needs Stable-Baselines3: install it with  pip install 'annelid[learn]'") from None
 
@@ -49,7 +49,7 @@ INTERVAL_S = {"three": 0.08, "six": 0.12}
 FINER: Mapping[str, Mapping[str, Any]] = {"three": {"clock.physics_timestep_s": 0.01}}
 """What the coarse resolution of an environment is not enough for: fast waves break it down."""
 EPISODE_STEPS = 80
-PIECE = 1000
+PIECE = 2000
 """Environment steps of a piece."""
 WAVES, SLOWER, WAVE_NOISE = 12, 0.3, 0.2
 """Waves that are shown; their times are those of `WAVE` times exp(-SLOWER) .. exp(SLOWER); noise on actions."""

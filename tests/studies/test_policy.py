@@ -97,7 +97,7 @@ def test_an_interrupted_training_ends_with_the_same_policy(tmp_path: Path, monke
         assert figure.exists()
         written[folder] = (path.read_text(), curve.read_text())
     assert written["stopped"] == written["whole"]
-    assert written["whole"][1].startswith("steps,training_m_per_s,level_m_per_s")
+    assert written["whole"][1].startswith("body,steps,training_m_per_s,level_m_per_s")
     [policy] = read_entrants(path).values()
     config = load_config("riddle2023-rods", policy.fields("three", "level"))
     assert config.controller.kind == "policy"

@@ -12,7 +12,7 @@ from __future__ import annotations
 import csv
 import json
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import astuple, dataclass
 from importlib import import_module
 from pathlib import Path
@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from annelid.errors import MissingDependency
+from annelid.errors import ConfigError, MissingDependency, suggest
 
 try:
     sb3: Any = import_module("stable_baselines3")
@@ -33,13 +33,15 @@ from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 
 from annelid.control.open_loop import TimedWave
-from annelid.draw import canvas, save_both
+from annelid.draw import canvas, panel_title, save_both, segment_colors
 from annelid.environments import WormEnv
 from annelid.experiment import StudyProgress
 from annelid.output import write_csv, write_text
 from annelid.protocols import Array
 from annelid_studies.challenge.policy import LARGEST, STRETCH_M, Policy, inputs
 from annelid_studies.challenge.tasks import FIRST_TEST_SEED, Entrant, all_tasks
+from annelid_studies.challenge.tuning import write_entrants
+from annelid_studies.tables import grouped
 
 TASKS = ("level", "friction", "slope")
 SEED = 0
@@ -87,6 +89,7 @@ ARRAYS = ("observations", "next_observations", "actions", "rewards", "dones", "t
 class Piece:
     """What a piece of training led to."""
 
+    body: str
     steps: int  # of the environment, so far
     training_m_per_s: float  # mean speed of its episodes
     level_m_per_s: float  # speed of the network at its end, without noise, on the draw of seed `EVALUATED`
@@ -202,7 +205,9 @@ class Learner:
         fields = self.fields()
         policy = Policy.model_validate(fields)
         speeds = [self._env.speed_m_per_s(policy, task, EVALUATED) for task in TASKS]
-        piece = Piece(self._model.num_timesteps, *(round(speed, 6) for speed in (training_m_per_s, *speeds)))
+        piece = Piece(
+            self._body, self._model.num_timesteps, *(round(speed, 6) for speed in (training_m_per_s, *speeds))
+        )
         if all(piece.speed_m_per_s > one.speed_m_per_s for one in self.pieces):
             self.best = fields
         self.pieces.append(piece)
@@ -285,7 +290,7 @@ class Learner:
                 getattr(memory, name)[: len(arrays[name])] = arrays[name]
             memory.pos, memory.full = len(arrays["dones"]), False
         with (folder / "curve.csv").open(newline="", encoding="utf-8") as file:
-            self.pieces = [Piece(int(row[0]), *map(float, row[1:])) for row in list(csv.reader(file))[1:]]
+            self.pieces = [Piece(row[0], int(row[1]), *map(float, row[2:])) for row in list(csv.reader(file))[1:]]
         self.best = json.loads((folder / "best.json").read_text(encoding="utf-8"))
         self._model.num_timesteps = self.pieces[-1].steps
 
@@ -301,38 +306,51 @@ def _rounded(weights: Any) -> list[Any]:
     return short(weights.detach().numpy().tolist())
 
 
-def train(bodies: list[str], n_steps: int, folder: Path, progress: StudyProgress | None = None) -> list[Path]:
+def train(bodies: Sequence[str], n_steps: int, folder: Path, progress: StudyProgress | None = None) -> list[Path]:
     """Trains a policy for each body, and writes it as an entrant.
 
     Args:
         bodies: Names of the bodies; none for all.
         n_steps: Steps of the environment, beside the waves at the beginning.
-        folder: Where checkpoints are kept, and where to write ``policy.toml`` and each body's learning curve. Called
-            again, it goes on from the checkpoints.
+        folder: Where checkpoints are kept, and where to write ``policy.toml``, the file of entrants, and the learning
+            curves, ``policy.csv`` with a picture. Called again, it goes on from the checkpoints.
         progress: Told how far it is.
-    """
-    from annelid_studies.challenge.tuning import write_entrants
 
-    on, written = {}, []
-    for body in bodies or all_tasks().bodies:
+    Raises:
+        ConfigError: A body is unknown.
+    """
+    found, on, pieces = all_tasks(), dict[str, Any](), list[Piece]()
+    for body in bodies:
+        if body not in found.bodies:
+            raise ConfigError(f"unknown body {body!r}: {suggest(body, found.bodies)}")
+    for body in bodies or found.bodies:
         learner = Learner(body, folder / "training" / body)
         for piece in learner.learn(n_steps):
             if progress is not None:
                 progress(f"training {body}", piece.steps, n_steps, piece.steps / n_steps)
         on[body] = {f"controller.{field}": value for field, value in learner.best.items()}
-        written += [write_csv(folder / f"{body}.csv", Piece.__slots__, map(astuple, learner.pieces))]
-        written += [_curve(learner.pieces, folder / body)]
-    summary = "a small network trained by reinforcement learning"
-    entrant = Entrant(summary=summary, controller={"kind": "policy"}, on=on)
-    return [write_entrants({"policy": entrant}, folder / "policy.toml"), *written]
+        pieces += learner.pieces
+    entrant = Entrant(
+        summary="a network that imitated waves and was trained on by reinforcement learning",
+        controller={"kind": "policy"},
+        on=on,
+    )
+    return [
+        write_entrants({"policy": entrant}, folder / "policy.toml"),
+        write_csv(folder / "policy.csv", Piece.__slots__, map(astuple, pieces)),
+        _curves(grouped(pieces, lambda one: one.body), folder / "policy"),
+    ]
 
 
-def _curve(pieces: list[Piece], stem: Path) -> Path:
+def _curves(pieces: Mapping[str, Sequence[Piece]], stem: Path) -> Path:
     with canvas(2.6) as figure:
-        axes = figure.subplots(subplot_kw={"xlabel": "steps of the environment", "ylabel": "speed (cm/s)"})
-        steps = [one.steps for one in pieces]
-        axes.plot(steps, [100 * one.training_m_per_s for one in pieces], color="0.6", label="while it learns")
-        for task in TASKS:
-            axes.plot(steps, [100 * getattr(one, f"{task}_m_per_s") for one in pieces], label=f"learned, {task}")
+        for axes, (body, own) in zip(figure.subplots(1, len(pieces), squeeze=False)[0], pieces.items(), strict=True):
+            steps = [one.steps for one in own]
+            axes.plot(steps, [100 * one.training_m_per_s for one in own], color="0.6", label="while it learns")
+            for task, color in zip(TASKS, segment_colors(len(TASKS)), strict=True):
+                speeds = [100 * getattr(one, f"{task}_m_per_s") for one in own]
+                axes.plot(steps, speeds, "o-", color=color, markersize=3, label=task)
+            axes.set(xlabel="steps of the environment", ylabel="speed (cm/s)")
+            panel_title(axes, body)
         axes.legend()
         return save_both(figure, stem)

@@ -228,7 +228,7 @@ def challenge_command(
     trials.csv.
 
     With --train it trains a network for each body on training draws (pip install 'annelid[learn]'). It writes
-    policy.toml, a file of entrants, and the learning curve of each body as CSV, PNG and SVG. It takes hours.
+    policy.toml, a file of entrants, and the learning curves policy.csv and policy.png. It takes hours.
 
     \b
     annelid study challenge --quick                                   in minutes

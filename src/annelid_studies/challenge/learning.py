@@ -230,12 +230,13 @@ class Learner:
     def _imitate(self) -> None:
         """Lets waves by the clock walk, with noise; the actor imitates the best, the critic learns from all."""
         rng, env, n = np.random.default_rng(SEED), self._env, self._env.n_segments
-        shown: list[tuple[float, list[tuple[Array, Array]]]] = []
+        shown: list[tuple[float, list[tuple[NDArray[Any], Array]]]] = []
         for seed in range(WAVES):
             slower = float(np.exp(rng.uniform(-SLOWER, SLOWER)))
             wave = TimedWave.model_validate({name: slower * value for name, value in WAVE[self._body].items()})
             env.begin(TASKS[0], seed)
-            before, way, asked, over, late = env.read(), 0.0, list[tuple[Array, Array]](), False, False
+            before: NDArray[Any] = env.read()
+            way, asked, over, late = 0.0, list[tuple[NDArray[Any], Array]](), False, False
             while not (over or late):
                 wanted = 2.0 * wave.activation((len(asked) + 1) * INTERVAL_S[self._body], n) - 1.0
                 action = np.clip(wanted + rng.normal(0.0, WAVE_NOISE, n), -INSIDE, INSIDE)
@@ -352,5 +353,5 @@ def _curves(pieces: Mapping[str, Sequence[Piece]], stem: Path) -> Path:
                 axes.plot(steps, speeds, "o-", color=color, markersize=3, label=task)
             axes.set(xlabel="steps of the environment", ylabel="speed (cm/s)")
             panel_title(axes, body)
-        axes.legend()
+        figure.axes[0].legend()
         return save_both(figure, stem)

@@ -86,18 +86,18 @@ def test_an_interrupted_training_ends_with_the_same_policy(tmp_path: Path, monke
     from annelid_studies.challenge import learning
     from annelid_studies.challenge.tasks import read_entrants
 
-    short = {"PIECE": 8, "EPISODE_STEPS": 5, "WAVES": 3, "IMITATION": 20, "CRITIC_FIRST": 2}
+    short = {"PIECE": 8, "EPISODE_STEPS": 3, "WAVES": 3, "IMITATION": 20, "CRITIC_FIRST": 2}
     for name, value in short.items():
         monkeypatch.setattr(learning, name, value)
-    stopped = learning.Learner("three", tmp_path / "stopped" / "training" / "three").learn(16)
-    assert [next(stopped).steps for _ in range(2)] == [0, 8]
+    stopped = learning.Learner("six", tmp_path / "stopped" / "training" / "six").learn(8)
+    assert next(stopped).steps == 0
     written = {}
     for folder in ("stopped", "whole"):
-        path, curve, figure = learning.train(["three"], 16, tmp_path / folder)
+        path, curve, figure = learning.train(["six"], 8, tmp_path / folder)
         assert figure.exists()
         written[folder] = (path.read_text(), curve.read_text())
     assert written["stopped"] == written["whole"]
     assert written["whole"][1].startswith("body,steps,training_m_per_s,level_m_per_s")
     [policy] = read_entrants(path).values()
-    config = load_config("riddle2023-rods", policy.fields("three", "level"))
+    config = load_config("riddle2025", policy.fields("six", "level"))
     assert config.controller.kind == "policy"

@@ -1,8 +1,8 @@
 """Trains the network of controller kind `policy` by reinforcement learning: soft actor-critic of Stable-Baselines3.
 
 An episode is one training draw of one of the tasks `TASKS`, in the Gymnasium environment of the body, with longer steps
-than the benchmark's own runs. The reward is the way that the worm comes. From a network at random, nothing was learned
-in the steps that a workstation makes in an hour, so the actor first imitates waves by the clock. Training goes piece by
+than the benchmark's own runs. The reward is the way that the worm comes. From random weights, no gait was found
+in 2,000 steps, so the actor first imitates waves by the clock. Training goes piece by
 piece: each has its own random numbers and ends in a checkpoint, so an interrupted training ends with the same bits as
 another.
 """
@@ -337,6 +337,7 @@ def train(bodies: Sequence[str], n_steps: int, folder: Path, progress: StudyProg
         summary="a network that imitated waves and was trained on by reinforcement learning",
         controller={"kind": "policy"},
         on=on,
+        tuned_on=tuple(range(FIRST_TEST_SEED)),
     )
     return [
         write_entrants({"policy": entrant}, folder / "policy.toml"),

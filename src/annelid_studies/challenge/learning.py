@@ -1,10 +1,9 @@
 """Trains the network of controller kind `policy` by reinforcement learning: soft actor-critic of Stable-Baselines3.
 
 An episode is one training draw of one of the tasks `TASKS`, in the Gymnasium environment of the body, with longer steps
-than the benchmark's own runs. The reward is the way that the worm comes. From random weights, no gait was found
-in 2,000 steps, so the actor first imitates waves by the clock. Training goes piece by
-piece: each has its own random numbers and ends in a checkpoint, so an interrupted training ends with the same bits as
-another.
+than the benchmark's own runs. The reward is the way that the worm comes. From random weights, no gait was found in
+2,000 steps, so the actor first imitates waves by the clock. Training goes piece by piece: each has its own random
+numbers and ends in a checkpoint, so an interrupted training ends with the same bits as another.
 """
 
 from __future__ import annotations
@@ -350,7 +349,7 @@ def _curves(pieces: Mapping[str, Sequence[Piece]], stem: Path) -> Path:
     with canvas(2.6) as figure:
         for axes, (body, own) in zip(figure.subplots(1, len(pieces), squeeze=False)[0], pieces.items(), strict=True):
             steps = [one.steps for one in own]
-            axes.plot(steps, [100 * one.training_m_per_s for one in own], color="0.6", label="while it learns")
+            axes.plot(steps, [100 * one.training_m_per_s for one in own], ".-", color="0.6", label="while it learns")
             for task, color in zip(TASKS, segment_colors(len(TASKS)), strict=True):
                 speeds = [100 * getattr(one, f"{task}_m_per_s") for one in own]
                 axes.plot(steps, speeds, "o-", color=color, markersize=3, label=task)

@@ -31,7 +31,8 @@ import gymnasium
 from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 
-from annelid.control.open_loop import TimedWave
+from annelid.config import load_config
+from annelid.control import OpenLoopKind
 from annelid.draw import canvas, panel_title, save_both, segment_colors
 from annelid.environments import WormEnv
 from annelid.experiment import StudyProgress
@@ -234,7 +235,11 @@ class Learner:
         shown: list[tuple[float, list[tuple[NDArray[Any], Array]]]] = []
         for seed in range(WAVES):
             slower = float(np.exp(rng.uniform(-SLOWER, SLOWER)))
-            wave = TimedWave.model_validate({name: slower * value for name, value in WAVE[self._body].items()})
+            times = {name: slower * value for name, value in WAVE[self._body].items()}
+            wave = load_config(
+                all_tasks().bodies[self._body].preset, {"controller": {"kind": "timed", **times}}
+            ).controller
+            assert isinstance(wave, OpenLoopKind)
             env.begin(TASKS[0], seed)
             before: NDArray[Any] = env.read()
             way, asked, over, late = 0.0, list[tuple[NDArray[Any], Array]](), False, False

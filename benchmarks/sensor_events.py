@@ -3,7 +3,7 @@
 Prints, for the paper's robot with rigid crossings, every switch of a stretch sensor and every contraction with the
 segments' lengthening, mm: as the preset is, with small and large tolerances, with stiff strands, and without the
 damping across the bend (docs/evidence/robust.md). Takes about two minutes. With ``--windows`` it measures, under a
-timed wave, what `annelid.plausibility.tolerance_window_m` estimates: how far neighbours lift a segment at rest, and
+timed wave, what `WormBody.tolerance_window_m` estimates: how far neighbours lift a segment at rest, and
 the length at which the releasing and the next segment are equally long. With ``--walks`` it runs the paper's network
 with tolerances about the edges of the window.
 
@@ -25,9 +25,9 @@ import numpy as np
 from annelid import Run, load_config, simulate
 from annelid.analysis import rhythm_score
 from annelid.analysis.rhythm import DESIGN_INTERVAL_S
+from annelid.body import worm_of
 from annelid.experiment.case import SHEAR_OVER_YOUNG
 from annelid.output import write_csv
-from annelid.plausibility import tolerance_window_m
 from annelid_studies.robustness import TIMED
 from annelid_studies.standard_cases import PAPERS_RODS
 
@@ -115,7 +115,7 @@ def print_windows(path: Path | None, step_s: float) -> None:
         config = load_config("riddle2023-rods", {**strands(modulus), **settings})
         with tempfile.TemporaryDirectory() as folder:
             measured = window_mm(simulate(config, folder, progress=False, overwrite=True))
-        estimated = tolerance_window_m(config)
+        estimated = worm_of(config).tolerance_window_m(friction)
         assert estimated is not None
         print(
             f"{modulus:4} GPa, friction {friction:4}, {damping:5} s: {measured[0]:5.1f} to {measured[1]:5.1f} mm, "
@@ -139,7 +139,7 @@ def print_walks(path: Path | None) -> None:
                 found = rhythm_score(simulate(config, folder, progress=False, overwrite=True))
             in_time = found.period_s is not None and abs(found.period_s / (3 * DESIGN_INTERVAL_S) - 1.0) < 0.1
             (walks if found.verdict == "ordered" and in_time else lost).append(tolerance_mm)
-        window = tolerance_window_m(load_config("riddle2023-rods", fields))
+        window = worm_of(load_config("riddle2023-rods", fields)).tolerance_window_m(friction)
         assert window is not None
         print(
             f"{modulus} GPa, friction {friction}: walks with {walks}, not with {lost} mm, window {window}", flush=True

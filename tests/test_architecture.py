@@ -219,7 +219,19 @@ def test_simulating_needs_neither_opengl_nor_matplotlib_nor_torch() -> None:
 
 
 def test_a_run_comes_to_its_table_without_what_only_pictures_and_studies_need(tmp_path: Path) -> None:
-    barred = ("OpenGL", "imageio", "markdown_it", "matplotlib", "optuna", "scipy", "tomlkit", "torch", "viser")
+    barred = (
+        "OpenGL",
+        "imageio",
+        "markdown_it",
+        "matplotlib",
+        "optuna",
+        "pandas",
+        "scipy",
+        "tomlkit",
+        "torch",
+        "viser",
+        "xarray",
+    )
     program = (
         f"import sys; sys.modules.update(dict.fromkeys({barred}))\n"
         "import annelid.draw.gallery as gallery; gallery.draw_all = lambda *_, **__: ()\n"

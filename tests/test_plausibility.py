@@ -20,8 +20,9 @@ from annelid.body.worm import WormBody
 from annelid.config import LEVELS, RunConfig, arena_names, load_config, preset_names
 from annelid.errors import ConfigError
 from annelid.morphology import helical_mesh, rhombus
-from annelid.plausibility import check, refuse_nonsense, tolerance_window_m
+from annelid.plausibility import check, refuse_nonsense
 from annelid.simulation import simulate
+from rods import tolerance_window_m
 
 Changes = dict[str, Any]
 NONSENSE: list[tuple[str, Changes, str]] = [

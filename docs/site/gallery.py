@@ -25,13 +25,14 @@ from annelid.cli import app, config_of, overrides_of
 from annelid.errors import ConfigError, RunKilled, suggest
 from annelid.experiment import Case, Store, study_progress
 from annelid.textfiles import parse_toml, read_json, read_text
+from overview import overview_picture
 
 ROOT = Path(__file__).parent.parent.parent
 IMAGES, RESULTS, KEPT = ROOT / "docs" / "images", ROOT / "docs" / "results", ROOT / "build" / "gallery"
 QUICK_MINUTES = 3.0
 """Pictures that take longer are made only if they are named."""
 TILE_PX, TILE_COLUMNS = (560, 350), 4
-PAGE_VIDEO_PX = (640, 400)
+OF_ONE_RUN = ("frame", "figure7", "track", "network", "video", "overview")
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +47,9 @@ class Picture:
     time_s: float = 0.0
     camera: str | None = None
     cameras: Mapping[str, str] = field(default_factory=dict)
+    size: Sequence[int] = (640, 400)
+    fps: float = 15.0
+    speed: float = 1.0
     study: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -53,9 +57,14 @@ class Job(NamedTuple):
     """A picture to make, with where things are."""
 
     picture: Picture
-    stem: Path  # Where to draw, without a suffix
+    path: Path  # Where to draw
     results: Path  # The file that it is redrawn from
     store: Store
+
+    @property
+    def stem(self) -> Path:
+        """The path without a suffix."""
+        return self.path.with_suffix("")
 
 
 @cache
@@ -95,14 +104,14 @@ def make(names: Sequence[str], output: Path = IMAGES, kept: Path = KEPT) -> list
         written = []
         for name in chosen:
             one = known[name]
-            drawn = made_by[one.maker](Job(one, kept / Path(name).stem, RESULTS / one.results, store))
+            drawn = made_by[one.maker](Job(one, kept / name, RESULTS / one.results, store))
             written.append(Path(shutil.copyfile(drawn, output / name)))
     return written
 
 
 def cases(picture: Picture) -> Mapping[str, Case]:
     """Returns the runs that a picture is drawn from: one, or that in every arena by the arena's name."""
-    if picture.maker not in ("frame", "figure7", "track", "video", "arenas"):
+    if picture.maker not in (*OF_ONE_RUN, "arenas"):
         return {}
     from typer.main import get_command
 
@@ -120,13 +129,16 @@ def cases(picture: Picture) -> Mapping[str, Case]:
 def _of_run(job: Job) -> Path:
     from annelid.draw import RUN_FIGURES, render_frame, render_video
 
-    one, path = job.picture, job.stem.with_suffix(".png")
+    one, path = job.picture, job.path
     (case,) = cases(one).values()
     run = job.store.run(case)
     if one.maker == "frame":
         return render_frame(run, one.time_s, path, camera=one.camera)
     if one.maker == "video":
-        return render_video(run, path.with_suffix(".mp4"), fps=15.0, size=PAGE_VIDEO_PX)
+        width, height = one.size
+        return render_video(run, path, fps=one.fps, speed=one.speed, camera=one.camera, size=(width, height))
+    if one.maker == "overview":
+        return overview_picture(run, one.time_s, path)
     return RUN_FIGURES.find(one.maker)(run, path)
 
 
@@ -151,7 +163,7 @@ def _arenas(job: Job) -> Path:
             axes.set_title(name, fontsize=8.0, pad=2.0)
         look: dict[str, Any] = {"loc": "center left", "alignment": "left", "fontsize": 8.0}
         panels[len(found)].legend(handles=handles, title=f"{time_s:g} s after the start", **look)
-        return save(figure, job.stem.with_suffix(".png"))
+        return save(figure, job.path)
 
 
 def _sweep(job: Job) -> Path:
@@ -209,21 +221,26 @@ def _uncertainty(job: Job) -> Path:
     from annelid.draw import uncertainty_figure
 
     rows = {row["quantity"]: {name: value or nan for name, value in row.items()} for row in _rows(job)}
-    return uncertainty_figure(rows, job.stem.with_suffix(".png"))
+    return uncertainty_figure(rows, job.path)
+
+
+def _challenge(job: Job) -> Path:
+    from annelid_studies.challenge import report, scores
+
+    return report.ranking_figure(scores.read_scores(job.results), job.stem)
 
 
 def makers() -> Mapping[str, Callable[[Job], Path]]:
     """All that an entry of the list can ask for."""
     from annelid_studies import riddle2025
-    from annelid_studies.challenge import ranking, report
 
     return {
-        **dict.fromkeys(("frame", "figure7", "track", "video"), _of_run),
+        **dict.fromkeys(OF_ONE_RUN, _of_run),
         "arenas": _arenas,
         "sweep": _sweep,
         "command": _command,
         "slip": _slip,
-        "challenge": partial(_fields, report.ranking_figure, ranking.Standing),
+        "challenge": _challenge,
         "riddle2025": partial(_fields, riddle2025.comparison_picture, riddle2025.Reading),
         "bench": _bench,
         "tuning": _tuning,

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from annelid.body.worm import worm_of
 from annelid.config.answers import Finding
 from annelid.config.run import RunConfig
 from annelid.errors import ConfigError
 
-__all__ = ["check", "refuse_nonsense", "tolerance_window_m"]
+__all__ = ["check", "refuse_nonsense"]
 
 
 def check(config: RunConfig) -> list[Finding]:
@@ -33,15 +32,3 @@ def refuse_nonsense(config: RunConfig) -> tuple[str, ...]:
     if errors:
         raise ConfigError(". ".join(errors))
     return tuple(map(str, found))
-
-
-def tolerance_window_m(config: RunConfig) -> tuple[float, float] | None:
-    """Estimates between which tolerances of the stretch sensors the paper's controller walks in order, m.
-
-    It is `WormBody.tolerance_window_m` on the ground of a configuration.
-
-    Raises:
-        ConfigError: The body is no 3D worm.
-    """
-    assert config.arena is not None
-    return worm_of(config).tolerance_window_m(config.arena.friction)

@@ -11,11 +11,20 @@ from __future__ import annotations
 from math import ceil, log, pi, sqrt
 from typing import Any
 
-from annelid.body import Mesh, WormBody, bearable_force_N, build_spec, compile_spec, rhombus_of, worm_of
+from annelid.body import (
+    Mesh,
+    WormBody,
+    bearable_force_N,
+    build_spec,
+    compile_spec,
+    longest_step_s,
+    rhombus_of,
+    worm_of,
+)
 from annelid.config import RunConfig, check_section, load_config, toml_value
 from annelid.errors import ConfigError, require_finite, require_positive
 from annelid.morphology import rhombus
-from annelid.plausibility import refuse_nonsense, tolerance_window_m
+from annelid.plausibility import refuse_nonsense
 
 BASE = "riddle2023-rods"
 """The preset that new worms are similar to."""
@@ -25,6 +34,8 @@ MOST_ELEMENTS = 3900
 """Most elements of all strands: two moving bodies each, and the engine is slow above 8,192."""
 LEAST_SHAPE, MOST_SHAPE = 1.2, 4.0
 """Turn of a strand along one radius of the axis, rad, within which a length is accepted; the base's is 2.24."""
+MOST_RADIUS_M = 1.0
+"""Six times that of the largest robot; more is taken for millimetres."""
 CYCLES = 4
 """Cycles of the paper's network, 0.875 s a segment at the base's size, that a run lasts."""
 TURN_S = 0.875
@@ -59,6 +70,8 @@ def similar_worm(
         ConfigError: A number is out of its range, or with this length strands would lie along the body or the rings.
     """
     asked = {
+        "radius_m": radius_m,
+        "rear_radius_m": rear_radius_m,
         "length_m": length_m,
         "segment_length_m": segment_length_m,
         "strand_radius_m": strand_radius_m,
@@ -68,6 +81,10 @@ def similar_worm(
         if value is not None:
             require_finite(**{name: value})
             require_positive(**{name: value})
+            if name.endswith("radius_m") and value > MOST_RADIUS_M:
+                raise ConfigError(
+                    f"{name} = {value:g} is over {MOST_RADIUS_M:g} m: give metres; {value:g} mm are {value / 1e3:g}"
+                )
     if length_m is not None and segment_length_m is not None:
         raise ConfigError("length_m and segment_length_m say the same: give one of them")
     base = load_config(BASE)
@@ -143,8 +160,8 @@ def similar_worm(
         "arena.floor_gap_m": (arena.model_dump()["floor_gap_m"] * scale, "a length"),
     }
     weight = thicker**2 * longer * n_helices / known.mesh.n_helices * n_segments / known.mesh.n_segments
-    network, steps = base.controller.model_dump(), _steps(base, n_segments, slower)
-    fields |= steps | {
+    network = base.controller.model_dump()
+    fields |= {
         "controller.capacitance_nF": (network["capacitance_nF"] * slower, "a time constant: radius^0.5"),
         "controller.gate_time_constant_ms": (network["gate_time_constant_ms"] * slower, "a time: radius^0.5"),
         "sensor.startup_hold_s": (base.sensor.startup_hold_s * slower, "a time: radius^0.5"),
@@ -154,13 +171,15 @@ def similar_worm(
     }
     # What follows from the whole mesh. The window was measured at the base's damping, which a similar worm's is.
     similar = load_config(BASE, _values(fields) | {"body.strands.damping_time_s": strands.damping_time_s})
-    body, window = worm_of(similar), tolerance_window_m(similar)
+    body = worm_of(similar)
+    window = body.tolerance_window_m(arena.friction)
     assert window is not None
     force = rings.forces(1)[0] * bearable_force_N(body) / bearable_force_N(known)
     low, high = window
     if low >= high:
         raise ConfigError(f"n_helices = {n_helices}: neighbours lift a segment further than it lengthens; take more")
     fields["body.rings.peak_force_N"] = (force, "the base's share of what the mesh bears")
+    steps = _steps(base, n_segments, slower, longest_step_s(body, force))
     if rear_radius_m is not None:
         fields |= _tapered(body, force, ranges, rear_radius_m)
     fields["sensor.tolerance_m"] = ((low + high) / 2.0, f"middle of the window {1e3 * low:.2g} to {1e3 * high:.2g} mm")
@@ -183,31 +202,12 @@ def _tapered(body: WormBody, force_N: float, range_m: list[float], rear_radius_m
     }
 
 
-def worm_text(
-    radius_m: float,
-    n_segments: int = 3,
-    n_helices: int = 12,
-    length_m: float | None = None,
-    rear_radius_m: float | None = None,
-    segment_length_m: float | None = None,
-    strand_radius_m: float | None = None,
-    young_modulus_Pa: float | None = None,
-) -> str:
-    """Returns `similar_worm` as TOML that ``annelid run`` takes, with the rule behind every number.
+def worm_text(fields: Fields) -> str:
+    """Returns a worm of `similar_worm` as TOML that ``annelid run`` takes, with the rule behind every number.
 
     Raises:
-        ConfigError: As `similar_worm`, or its run would be refused, by the checks or by the engine.
+        ConfigError: Its run would be refused, by the checks or by the engine.
     """
-    fields = similar_worm(
-        radius_m,
-        n_segments,
-        n_helices,
-        length_m,
-        rear_radius_m,
-        segment_length_m,
-        strand_radius_m,
-        young_modulus_Pa,
-    )
     config = load_config(BASE, _values(fields))
     refuse_nonsense(config)
     compile_spec(build_spec(config))
@@ -215,8 +215,10 @@ def worm_text(
     for path, (value, rule) in fields.items():
         table, _, name = path.rpartition(".")
         tables.setdefault(table, []).append(f"{f'{name} = {toml_value(value)}':<40}  # {rule}")
+    mesh = worm_of(config).mesh
+    shape = f"radius {mesh.radii_m[0]:g} m, {mesh.n_segments} segments and {mesh.n_helices} strands"
     heading = [
-        f"# A worm of radius {radius_m:g} m, {n_segments} segments and {n_helices} strands that moves as {BASE} does.",
+        f"# A worm of {shape} that moves as {BASE} does.",
         "# Numbers follow from the geometry by Froude similarity; the rule stands beside each. Replace what you can",
         "# measure on your robot. annelid check compares the numbers with one another.",
         f'extends = "{BASE}"',
@@ -225,19 +227,24 @@ def worm_text(
     return "\n\n".join(parts) + "\n"
 
 
-def _steps(base: RunConfig, n_segments: int, slower: float) -> Fields:
-    """The clock's steps, times as all others, and what is a multiple of them."""
-    control_s = float(f"{base.clock.control_timestep_s * slower:.2g}")
-    n_control = round(base.clock.physics_timestep_s / base.clock.control_timestep_s)
+def _steps(base: RunConfig, n_segments: int, slower: float, longest_s: float) -> Fields:
+    """The clock's steps, times as all others but no longer than muscles bear, and what is a multiple of them."""
+    clock, record = base.clock, base.record
+    control_s = float(f"{min(clock.control_timestep_s * slower, 0.95 * longest_s):.2g}")
+    n_control = min(round(clock.physics_timestep_s / clock.control_timestep_s), int(longest_s / control_s))
     physics_s = n_control * control_s
+    n_signal = round(record.signals_interval_s * slower / physics_s)
+    n_frame = n_signal * round(record.frames_interval_s / record.signals_interval_s)
     n_physics = ceil(CYCLES * n_segments * TURN_S * slower / physics_s)
-    n_frame = round(base.record.frames_interval_s / base.clock.physics_timestep_s)
     return {
         "duration_s": (round(n_physics * physics_s, 9), f"{CYCLES} cycles"),
-        "clock.control_timestep_s": (control_s, "a time: radius^0.5"),
-        "clock.physics_timestep_s": (round(physics_s, 9), f"{n_control} steps of the network"),
-        "record.signals_interval_s": (round(physics_s, 9), "every step of the body"),
-        "record.frames_interval_s": (round(n_frame * physics_s, 9), f"{n_frame} steps of the body"),
+        "clock.control_timestep_s": (control_s, "a time: radius^0.5, at most the body's step"),
+        "clock.physics_timestep_s": (
+            round(physics_s, 9),
+            f"steps of the network: {n_control}, fewer for strong muscles",
+        ),
+        "record.signals_interval_s": (round(n_signal * physics_s, 9), f"steps of the body: {n_signal}"),
+        "record.frames_interval_s": (round(n_frame * physics_s, 9), f"steps of the body: {n_frame}"),
     }
 
 

@@ -6,7 +6,7 @@ either way, with its 95 % interval, and beside it the change of each number at f
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from math import isnan
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
@@ -109,21 +109,11 @@ def changes_for(gait: str, quantity: Quantity, value: float) -> dict[str, Any]:
     }
 
 
-def crawl(store: Store, gaits: Sequence[str], effort: Effort) -> list[Reading]:
-    """Runs every gait over all values, as far as the store does not hold the runs.
-
-    Raises:
-        ConfigError: A gait is unknown or no 3D worm's.
-        AnnelidError: A run cannot be built or written.
-    """
-    cases = runs(gaits, effort)
-    store.compute(cases.values(), "crawling")
-    return [Reading(*point, judge(store[case])) for point, case in cases.items()]
-
-
 def speed(store: Store, output: Path, effort: Effort, gaits: Sequence[str] | None = None) -> Results:
     """The study `speed`, of `GAITS` or others."""
-    readings = crawl(store, gaits or GAITS, effort)
+    cases = runs(gaits or GAITS, effort)
+    store.compute(cases.values(), "crawling")
+    readings = [Reading(*point, judge(store[case])) for point, case in cases.items()]
     path = write_readings(readings, output / "speed.csv")
     return (path,), [crawling_table(readings, quantity) for quantity in VALUES]
 
@@ -200,28 +190,16 @@ def variants(gait: str, effort: Effort) -> tuple[list[dict[str, Any]], dict[str,
     return perturbed, {"half_step": half, "quarter_step": quarter, **elements}
 
 
-def headlines(store: Store, gaits: Sequence[str], effort: Effort) -> Iterator[Headline]:
-    """Runs every gait with its perturbed and finer runs, and yields its headline as soon as it is there.
-
-    Raises:
-        ConfigError: A gait is unknown or no 3D worm's.
-        AnnelidError: A run cannot be built or written.
-    """
-    plans = {gait: variants(gait, effort) for gait in gaits}
-    for gait, (perturbed, finer) in plans.items():
-        cases = [Case(gait, changes) for changes in ({}, *perturbed, *finer.values())]
-        store.compute(cases, gait)
-        own, *others = (judge(store[case]) for case in cases)
-        found = dict(zip(finer, others[len(perturbed) :], strict=True))
-        yield Headline(gait, own, others[: len(perturbed)], found)
-
-
 def gaits(store: Store, output: Path, effort: Effort, gaits: Sequence[str] | None = None) -> Results:
     """The study `gaits`, of `HEADLINES` or others; the file is written gait by gait."""
     found: list[Headline] = []
     path = output / "gaits.csv"
-    for one in headlines(store, gaits or HEADLINES, effort):
-        found.append(one)
+    for gait, (perturbed, finer) in {gait: variants(gait, effort) for gait in gaits or HEADLINES}.items():
+        cases = [Case(gait, changes) for changes in ({}, *perturbed, *finer.values())]
+        store.compute(cases, gait)
+        own, *others = (judge(store[case]) for case in cases)
+        of_finer = dict(zip(finer, others[len(perturbed) :], strict=True))
+        found.append(Headline(gait, own, others[: len(perturbed)], of_finer))
         write_headlines(found, path)
     return (path,), [headline_table(found)]
 

@@ -119,12 +119,18 @@ def trials(quick: bool = False) -> list[Trial]:
     return made
 
 
-def pass_pipes(store: Store, wanted: Sequence[Trial]) -> tuple[list[Reading], Courses]:
-    """Runs trials, as far as the store does not have them, and reads how they went.
+def _course(run: Run, passage: Passage) -> Course:
+    data, time = run.data, run.data["time"].values
+    rings = data["ring_length"].values.reshape(len(time), run.config.body.n_segments, -1).sum(axis=2)
+    drive = data["drive"].values if "drive" in data else np.zeros(len(time))
+    smooth = np.array([drive[np.abs(time - now) <= WINDOW_S / 2].mean() for now in passage.time_s])
+    first_ring = np.interp(passage.time_s, time, rings[:, 0])
+    return Course(passage.front_m, passage.bore_m[:, 0], passage.speed_over_m_per_s(WINDOW_S), smooth, first_ring)
 
-    Raises:
-        RunFileError: A run ended before its second posture.
-    """
+
+def study(store: Store, output: Path, effort: Effort) -> Results:
+    """The study `pipes`; a run that ended before its second posture is a RunFileError."""
+    wanted = trials(effort == "quick")
     store.compute([trial.case for trial in wanted], "pipes")
     readings, courses = [], {}
     for trial in wanted:
@@ -146,21 +152,6 @@ def pass_pipes(store: Store, wanted: Sequence[Trial]) -> tuple[list[Reading], Co
         )
         if trial.gait in (FIXED, ADAPTIVE):
             courses[trial.arena, trial.gait] = _course(run, passage)
-    return readings, courses
-
-
-def _course(run: Run, passage: Passage) -> Course:
-    data, time = run.data, run.data["time"].values
-    rings = data["ring_length"].values.reshape(len(time), run.config.body.n_segments, -1).sum(axis=2)
-    drive = data["drive"].values if "drive" in data else np.zeros(len(time))
-    smooth = np.array([drive[np.abs(time - now) <= WINDOW_S / 2].mean() for now in passage.time_s])
-    first_ring = np.interp(passage.time_s, time, rings[:, 0])
-    return Course(passage.front_m, passage.bore_m[:, 0], passage.speed_over_m_per_s(WINDOW_S), smooth, first_ring)
-
-
-def study(store: Store, output: Path, effort: Effort) -> Results:
-    """The study `pipes`."""
-    readings, courses = pass_pipes(store, trials(effort == "quick"))
     path = write_fields(Reading, readings, output / "pipes.csv")
     return (path, pipes_picture(readings, courses, path.with_suffix(""))), [pipes_table(readings)]
 

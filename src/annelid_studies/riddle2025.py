@@ -195,13 +195,9 @@ def in_figure(point: Point) -> str:
     return "drawn" if point.radius_m >= SMALLEST_DRAWN_M[point.gait] else "taken out"
 
 
-def compare(store: Store, wanted: Sequence[Point]) -> list[Reading]:
-    """Runs the worm at points, as far as the store does not have the runs, and reads them.
-
-    Raises:
-        AnnelidError: A run cannot be made.
-    """
-    runs = {point: cases(point) for point in wanted}
+def study(store: Store, output: Path, effort: Effort) -> Results:
+    """The study `riddle2025`."""
+    runs = {point: cases(point) for point in points(effort == "quick")}
     store.compute([case for of in runs.values() for case in of], "riddle2025")
     readings = []
     for point, own in runs.items():
@@ -210,12 +206,6 @@ def compare(store: Store, wanted: Sequence[Point]) -> list[Reading]:
         mean = mean_and_interval(speeds)
         counts = sum(out), sum(passed), min(ways)
         readings.append(Reading(*point, len(own), *mean, *counts, in_figure(point), own[0].command))
-    return readings
-
-
-def study(store: Store, output: Path, effort: Effort) -> Results:
-    """The study `riddle2025`."""
-    readings = compare(store, points(effort == "quick"))
     path = write_fields(Reading, readings, output / "riddle2025.csv")
     return (path, comparison_picture(readings, path.with_suffix(""))), [comparison_table(readings)]
 

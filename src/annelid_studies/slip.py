@@ -73,17 +73,8 @@ def case(controller: str, friction: float, **changes: Any) -> Case:
     return Case(PRESET, {**own, **changes})
 
 
-def slip_feedback(store: Store, effort: Effort, *, half_step: bool = False) -> list[Reading]:
-    """Runs the worm by every controller on every friction, as far as the store does not have the runs.
-
-    Args:
-        store: Where runs are kept.
-        effort: How many frictions and draws there are.
-        half_step: Whether bodies move in steps half as long.
-
-    Raises:
-        AnnelidError: A run cannot be made.
-    """
+def feedback(store: Store, output: Path, effort: Effort, half_step: bool = False) -> Results:
+    """The study `slip`."""
     steps = finer_steps(load_config(PRESET))[0] if half_step else {}
     cases = {
         (friction, controller): [
@@ -101,12 +92,6 @@ def slip_feedback(store: Store, effort: Effort, *, half_step: bool = False) -> l
         estimates = (speed, loss, speed / timed_speed - 1.0, 1.0 - loss / timed_loss)
         in_order = sum(store[one].rhythm.is_one_wave for one in own)
         readings.append(Reading(*at, in_order, len(own), *(mean_and_interval(each.tolist()) for each in estimates)))
-    return readings
-
-
-def feedback(store: Store, output: Path, effort: Effort, half_step: bool = False) -> Results:
-    """The study `slip`."""
-    readings = slip_feedback(store, effort, half_step=half_step)
     path = write_readings(readings, output / "slip.csv")
     return (path, feedback_figure(readings, path.with_suffix(""))), [feedback_table(readings)]
 
@@ -189,29 +174,16 @@ CASES: dict[str, Case] = {
 QUICK_CASES = (CHOSEN_ON, "sns-pressure, friction 1")
 
 
-def slip_detection(store: Store, names: Sequence[str] = tuple(CASES)) -> dict[str, Detection]:
-    """Runs the worms of some of `CASES`, as far as the store does not have them, and lets the detector read each.
-
-    Raises:
-        AnnelidError: A run cannot be made.
-    """
-    store.compute([CASES[name] for name in names], "detector")
-    return {name: detect_slip(store.run(CASES[name])) for name in names}
-
-
 def detection(store: Store, output: Path, effort: Effort) -> Results:
-    """The study `slip-detector`."""
-    found = slip_detection(store, QUICK_CASES if effort == "quick" else tuple(CASES))
-    scored = scores(found)
+    """The study `slip-detector`, of every run, and of all together but the one that it was chosen on."""
+    names = QUICK_CASES if effort == "quick" else tuple(CASES)
+    store.compute([CASES[name] for name in names], "detector")
+    found = {name: detect_slip(store.run(CASES[name])) for name in names}
+    scored = {name: score_detections([one], LIMIT_M_PER_S) for name, one in found.items()}
+    unseen = [one for name, one in found.items() if name != CHOSEN_ON]
+    scored["all but the first"] = score_detections(unseen, LIMIT_M_PER_S)
     path = write_scores(scored, output / "slip_detector.csv")
     return (path, detector_figure(found, path.with_suffix(""))), [detection_table(scored)]
-
-
-def scores(detections: Mapping[str, Detection]) -> dict[str, DetectionScore]:
-    """Scores every run at the detector's own limit, and all of them but the one that it was chosen on together."""
-    each = {name: score_detections([one], LIMIT_M_PER_S) for name, one in detections.items()}
-    unseen = [one for name, one in detections.items() if name != CHOSEN_ON]
-    return each | ({"all but the first": score_detections(unseen, LIMIT_M_PER_S)} if unseen else {})
 
 
 def write_scores(found: Mapping[str, DetectionScore], path: Path) -> Path:

@@ -122,18 +122,10 @@ class Reading:
     command: str  # The command line that makes the run
 
 
-def turning(
-    store: Store, modulations: Sequence[float] = MODULATIONS, gaits: Sequence[Gait] = GAITS
-) -> tuple[list[Reading], list[Track]]:
-    """Runs every gait under every modulation, and measures the turns.
-
-    Returns:
-        The readings, and the tracks that they were read from, in the same order.
-
-    Raises:
-        RunFileError: A run ended before its second cycle.
-    """
-    cases = [(gait, modulation, gait.case(modulation)) for gait in gaits for modulation in modulations]
+def study(store: Store, output: Path, effort: Effort) -> Results:
+    """The study `turning`; a run that ended before its second cycle is a RunFileError."""
+    modulations = QUICK if effort == "quick" else MODULATIONS
+    cases = [(gait, modulation, gait.case(modulation)) for gait in GAITS for modulation in modulations]
     store.compute([case for _, _, case in cases], "turning")
     readings, tracks = [], []
     for gait, modulation, case in cases:
@@ -156,12 +148,6 @@ def turning(
             )
         )
         tracks.append(track)
-    return readings, tracks
-
-
-def study(store: Store, output: Path, effort: Effort) -> Results:
-    """The study `turning`."""
-    readings, tracks = turning(store, QUICK if effort == "quick" else MODULATIONS)
     path = write_fields(Reading, readings, output / "turning.csv")
     return (path, turning_picture(readings, tracks, path.with_suffix(""))), [turning_table(readings)]
 

@@ -239,7 +239,7 @@ def test_a_continued_run_is_judged_from_any_segment_on() -> None:
 
 def run_of(data: Any, **overrides: Any) -> Run:
     path = Path("run.nc")
-    return Run(path, data, load_config("riddle2023-rods", overrides), "complete", "")
+    return Run(path, {}, {}, load_config("riddle2023-rods", overrides), "complete", "").with_data(data)
 
 
 def test_half_rings_count_as_their_segment() -> None:
@@ -278,7 +278,7 @@ def lengthened(peaks_m: list[float]) -> RhythmScore:
     swing = 0.2 * np.sin(2 * np.pi * 4.0 * time)
     stretch = np.stack([p * (pulses(time, o, 0.8) + swing) for p, o in zip(peaks_m, onsets, strict=True)], axis=1)
     data = wave_data(duration_s=float(time[-1]), interval_s=0.01)
-    data = data.assign(stretch_length=data["stretch_rest_length"] + xr.DataArray(stretch, dims=("time", "segment")))
+    data = data.assign(stretch_length=xr.DataArray(stretch, dims=("time", "segment")) + data["stretch_rest_length"])
     return lengthening_score(run_of(data))
 
 

@@ -20,7 +20,7 @@ from synthetic import FIRST_HELIX_EXCESS, HOLDING_FORCE_N, PEAKS_M, wave_data
 
 def run_of(data: xr.Dataset, **tree: Any) -> Run:
     config = check_config({"name": "riddle2023", "published": "riddle2023"} | tree)
-    return Run(Path("run.nc"), data, config, "complete", "")
+    return Run(Path("run.nc"), {}, {}, config, "complete", "").with_data(data)
 
 
 def holds_nan(value: object) -> bool:

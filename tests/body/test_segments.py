@@ -15,9 +15,9 @@ from annelid.body.worm import WormBody
 from annelid.config import RunConfig, field_value, load_config
 from annelid.errors import ConfigError
 from annelid.morphology import MeshGeometry
-from annelid.plausibility import check, tolerance_window_m
+from annelid.plausibility import check
 from annelid.simulation.worm import WormPlant
-from rods import rods_of
+from rods import rods_of, tolerance_window_m
 
 RODS = "riddle2023-rods"
 TAPER_M = [0.16, 0.14, 0.12]

@@ -73,6 +73,8 @@ def test_compare_prints_a_table_and_draws_into_a_folder(annelid: Command, run: P
     assert "travel.png not drawn" in done.sentence()
     assert "--force" in annelid("compare", run, finished, "-o", "both").sentence()
     assert "at least two runs" in annelid("compare", run).err
+    Path("network.toml").write_text("a = 1")
+    assert "with --network of a network" in annelid("compare", run, "network.toml").sentence()
 
 
 def test_compare_with_a_measured_log(annelid: Command, run: Path) -> None:

@@ -61,7 +61,7 @@ Fakes = dict[str, dict[str, object]]
 STUDIES: dict[str, Fakes] = {
     "study challenge": {
         "annelid_studies.challenge.scores": {"challenge": []},
-        "annelid_studies.challenge.ranking": {"standings": []},
+        "annelid_studies.challenge.ranking": {"standings": [], "pairs": []},
         "annelid_studies.challenge.report": {},
     },
     "study speed": {"annelid_studies.crawling": {"crawl": []}},

@@ -59,21 +59,6 @@ NO_WORM = {
 """Result files that are not of presets, and why."""
 
 STALE: tuple[str, ...] = (
-    "challenge.csv",
-    "challenge_10ms.csv",
-    "challenge_2ms_runs.csv",
-    "challenge_5ms.csv",
-    "challenge_bend_wave.csv",
-    "challenge_draws.csv",
-    "challenge_half.csv",
-    "challenge_half_runs.csv",
-    "challenge_runs.csv",
-    "challenge_six_wave.csv",
-    "challenge_six_wave_5ms.csv",
-    "challenge_tasks.csv",
-    "challenge_tune_5ms.csv",
-    "challenge_wave_2ms.csv",
-    "challenge_wave_5ms.csv",
     "robustness_three_segments.json",
     "weak_middle.csv",
 )

@@ -89,6 +89,7 @@ def test_repeats_have_the_interval_of_students_t() -> None:
     axes = Figure().subplots()
     _line(axes, grid(["arena.friction"], True), "arena.friction", "slip_ratio")
     assert len(axes.containers) == 1
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("friction", "slip ratio")
     legend = axes.get_legend()
     assert legend is not None
     assert [text.get_text() for text in legend.get_texts()] == ["one run", "mean, 95 % interval"]

@@ -16,11 +16,12 @@ def test_bars_are_nested_and_end_at_the_root_of_the_sum_of_squares() -> None:
     ends: list[list[float]] = [[], []]
     for bars in axes.collections:
         for (place, low), (_, high) in bars.get_segments():  # type: ignore[attr-defined]
-            value = values[round(place)]
-            ends[round(place)].append(max(abs(low - value), abs(high - value)))
-    # Two pieces of every bar, one up and one down.
-    assert sorted(ends[0]) == pytest.approx([0.3, 0.3, sqrt(0.25), sqrt(0.25), 1.3, 1.3])
-    assert ends[1] == pytest.approx([0.1] * 6)
+            assert low + high == pytest.approx(2.0 * values[round(place)])
+            ends[round(place)].append((high - low) / 2.0)
+    assert ends[0] == pytest.approx([0.3, sqrt(0.25), 1.3])
+    assert ends[1] == pytest.approx([0.1] * 3)
+    inner, outer = (bars.get_zorder() for bars in axes.collections[::2])
+    assert inner > outer, "a long bar does not hide a short one"
     low, high = axes.get_ylim()
     assert low < 6.7
     assert high > 9.3

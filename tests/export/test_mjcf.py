@@ -10,7 +10,6 @@ import pytest
 
 from annelid.body.assemble import mjcf_text
 from annelid.config import load_config
-from annelid.errors import ConfigError
 from annelid.export.formats import write_mjcf
 from annelid.simulation.loop import simulate
 from annelid.simulation.runfile import Run, read_checkpoint
@@ -83,9 +82,3 @@ def test_servos_start_paid_out_and_go_on_from_their_slack(tmp_path: Path) -> Non
 def test_a_worm_with_muscles_needs_no_keyframe() -> None:
     model = mujoco.MjModel.from_xml_string(mjcf_text(load_config("riddle2023-rods")))
     assert model.nkey == 0
-
-
-def test_planar_worms_have_no_model(planar_run: Run, tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match="needs the 3D worm"):
-        write_mjcf(planar_run, tmp_path / "worm.xml")
-    assert not (tmp_path / "worm.xml").exists()

@@ -44,7 +44,7 @@ def run() -> Run:
     for name in ("stretch_length", "ring_length", "center_of_mass"):
         data[name].attrs["units"] = "m"
     data["muscle_force"].attrs["units"] = "N"
-    return Run(Path("run.nc"), data, load_config("riddle2023-rods"), "complete", "")
+    return Run(Path("run.nc"), {}, {}, load_config("riddle2023-rods"), "complete", "").with_data(data)
 
 
 def log_of(run: Run, *, rate_Hz: float = 50.0, lag_s: float = LAG_S, drift: float = 0.0) -> pd.DataFrame:

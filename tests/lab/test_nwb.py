@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -137,7 +136,7 @@ def test_a_part_keeps_its_times(planar_run: Run, target: Path) -> None:
 def test_what_nwb_cannot_hold_is_refused(rods_run: Run, planar_run: Run, target: Path) -> None:
     with pytest.raises(RunFileError, match="qpos"):
         FORMATS.find("nwb").write(selected(rods_run, Selection(["qpos"])), target.with_suffix(".nwb"), nothing)
-    undated = replace(planar_run, data=planar_run.data.assign_attrs(created="yesterday"))
+    undated = planar_run.with_data(planar_run.data.assign_attrs(created="yesterday"))
     with pytest.raises(RunFileError, match="created = 'yesterday'"):
         FORMATS.find("nwb").write(undated, target.with_suffix(".nwb"), nothing)
     assert not target.with_suffix(".nwb").exists()

@@ -95,7 +95,7 @@ def hostile(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
     for name in data.variables:
         data[name].attrs = dict.fromkeys(data[name].attrs, HOSTILE)
     data = data.assign_coords(neuron=[f"=cmd|{i}{HOSTILE}" for i in range(data.sizes["neuron"])])
-    changed = replace(run, data=data, message=HOSTILE)
+    changed = replace(run.with_data(data), message=HOSTILE)
     monkeypatch.setattr("annelid.simulation.runfile.open_run", lambda _: changed)
     return changed
 

@@ -54,6 +54,7 @@ def wave_data(
             "edge_strain": (("time",), 0.001 * activation.max(axis=1)),
             "pin_gap": (("time",), np.full(len(time), 0.002)),
             "wall_time": (("time",), 2.0 * time),
+            "frame_time": (("frame",), np.empty(0)),
         },
         coords={
             "time": time,

@@ -191,7 +191,7 @@ def test_pictures_show_things_where_they_are(tmp_path: Path) -> None:
     assert drawn.model.geom_rgba[geom, 3] == 1.0
     assert drawn.model.geom_group[geom] <= 2, "as the engine draws"
     # The camera keeps to the worm.
-    ends = drawn.part_ends(run.data["qpos"].values[-1])
+    ends = drawn.outline(run.data["qpos"].values[-1])
     assert ends[:, 0].min() > run.data["crossing_position"].values[..., 0].min() - 0.1
 
 

@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from annelid.body import build_spec, compile_spec
 from annelid.config import RunConfig, load_config
 from annelid.simulation.worm import WormPlant
 
@@ -128,3 +129,22 @@ def test_the_engine_s_warnings_become_alarms_and_no_file(
     assert any(alarm and "did not converge" in alarm for alarm in alarms)
     assert list(tmp_path.iterdir()) == []
     assert capfd.readouterr() == ("", "")
+
+
+def test_contact_sensors_change_nothing_in_the_motion() -> None:
+    # A chain's plant takes the engine's own steps, so that the model can be stepped without one.
+    changes = {"body.mesh.n_helices": 8, "clock.physics_timestep_s": 0.001}
+    config = load_config("riddle2023", changes)
+    plant = WormPlant(config)
+    plant.reset(0)
+    spec = build_spec(config)
+    spec.option.disableflags = plant.model.opt.disableflags
+    plain = compile_spec(spec)
+    data = mujoco.MjData(plain)
+    pull = np.array([1.0, 0.0, 0.5])
+    for _ in range(10):
+        plant.step(pull)
+    data.ctrl[:] = pull
+    mujoco.mj_step(plain, data, 10)
+    assert np.array_equal(plant.data.qpos, data.qpos)
+    assert plant.model.nsensor > plain.nsensor

@@ -16,6 +16,7 @@ from annelid.errors import ConfigError, RunFileError
 from annelid.experiment import Store
 from annelid.protocols import Array, Controller, Plant, Sensation
 from annelid.simulation import WormPlant, build_controller
+from annelid_lab.robots.body import EXAMPLE
 from annelid_studies.challenge import report, scores, tasks
 from annelid_studies.challenge.controllers import DiscreteGait
 from annelid_studies.challenge.ranking import ALL, Speeds, half_step_changes, mean_ranks, pairs, standings
@@ -200,6 +201,21 @@ def test_an_interval_holds_the_mean_of_tasks_and_draws_as_often_as_it_says() -> 
     assert 175 <= held <= 199, "95 % of 200, less what a percentile bootstrap of 20 tasks lacks"
 
 
+def test_energies_of_a_pair_are_compared_on_the_runs_that_both_finish() -> None:
+    rng = np.random.default_rng(2)
+    rows = [
+        replace(SCORE, task=task, seed=seed, slip_J=float(rng.uniform(1.0, 2.0)))
+        for task in ("slope", "level")
+        for seed in range(4)
+    ]
+    rows += [replace(one, entrant="mine", slip_J=1.5 * one.slip_J, work_J=0.5 * one.work_J) for one in rows]
+    rows[-1] = replace(rows[-1], refused="wild", slip_J=nan, work_J=nan, distance_m=0.0)
+    rows[-2] = replace(rows[-2], slip_J=1e6, distance_m=-0.1)
+    overall = next(one for one in pairs(rows) if one.body == ALL)
+    assert (overall.slip_low, overall.slip, overall.slip_high) == pytest.approx((1 / 1.5,) * 3, rel=1e-3)
+    assert overall.work == pytest.approx(2.0)
+
+
 def test_a_pair_whose_order_turns_at_half_the_step_says_so() -> None:
     rows = [replace(SCORE, seed=seed, finer=finer) for seed in (0, 1, 2) for finer in (1, 2) if finer == 1 or seed == 0]
     fast = {1: 0.06, 2: 0.04}
@@ -229,7 +245,7 @@ def test_a_worm_that_gets_nowhere_has_no_energy_per_metre(tmp_path: Path) -> Non
     path = report.write_rows(type(found[0]), found, tmp_path / "scores.csv")
     line = next(line for line in path.read_text().splitlines() if line.startswith("mine,all"))
     assert line.endswith(",,,")
-    assert report.ranking_figure(found, Speeds(rows), tmp_path / "figure").exists()
+    assert report.ranking_figure(rows, tmp_path / "figure").exists()
 
 
 def test_a_strangers_scores_are_numbers_or_refused(subtests: pytest.Subtests, tmp_path: Path) -> None:
@@ -285,18 +301,41 @@ def test_runs_are_scored_kept_and_refused_ones_told(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("short")
+def test_an_entrant_brings_its_body_to_the_tasks_of_walking(tmp_path: Path) -> None:
+    (tmp_path / "balls.xml").write_text(EXAMPLE)
+    text = "[balls]\npreset = 'balls.xml'\ncontroller.kind = 'sine'\n"
+    (tmp_path / "mine.toml").write_text(text + "[other]\npreset = 'crawler'\ncontroller.kind = 'sine'\n")
+    entrants = find_entrants([str(tmp_path / "mine.toml")])
+    wanted = [one for one in entries(entrants, [], [1000], duration_s=0.1) if one.entrant != REFERENCE]
+    assert [(one.body, one.task) for one in wanted] == [
+        ("balls", "level"),
+        *(("crawler", task) for task in ("level", "friction", "slope", "rough")),
+    ]
+    [balls] = challenge(Store(tmp_path / "runs"), wanted[:1])
+    assert not balls.refused
+    assert balls.length_m == pytest.approx(0.3, rel=0.3)
+    assert report.own_bodies_table([balls]).row_count == 1
+    (tmp_path / "mine.toml").write_text(text.replace("balls.xml", "bolls.xml"))
+    with pytest.raises(ConfigError, match=r"entrant balls.*bolls\.xml"):
+        find_entrants([str(tmp_path / "mine.toml")])
+
+
+@pytest.mark.usefixtures("short")
 def test_a_search_takes_the_fastest_of_its_trials_and_goes_on_where_it_was(tmp_path: Path) -> None:
     text = "[mine]\ncontroller.kind = 'discrete'\n[mine.vary]\n"
-    text += "'controller.unit_s' = {low = 0.05, high = 0.3, log = true}\n"
+    text += "'controller.unit_s' = {low = 0.05, high = 0.9, log = true}\n"
     (tmp_path / "mine.toml").write_text(text + "'controller.contracted' = {low = 1, high = 199, whole = true}\n")
     entrants = {"mine": find_entrants([str(tmp_path / "mine.toml")])["mine"]}
     store = Store(tmp_path / "runs")
-    found = tune(entrants, 3, store, bodies=["three"], duration_s=0.3)
+    found, trials = tune(entrants, 3, store, bodies=["three"], duration_s=0.3)
+    # Both patterns at three paces, and the pace and pattern that it has.
+    assert len(trials) == 1 + 6 + 3
+    assert trials[0].speed_m_per_s == max(one.speed_m_per_s for one in trials)
     assert set(found["mine"].on["three"]) == {"controller.unit_s", "controller.contracted"}
     assert found["mine"].on["three"]["controller.contracted"] in (1, 2)
     assert found["mine"].tuned_on == (0, 1)
     before = {path: path.stat().st_mtime_ns for path in tmp_path.glob("runs/*/run.nc")}
-    assert tune(entrants, 3, store, bodies=["three"], duration_s=0.3) == found
+    assert tune(entrants, 3, store, bodies=["three"], duration_s=0.3) == (found, trials)
     assert {path: path.stat().st_mtime_ns for path in tmp_path.glob("runs/*/run.nc")} == before
     written = write_entrants(found, tmp_path / "entrants.toml")
     assert tasks.read_entrants(written) == found

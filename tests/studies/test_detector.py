@@ -130,9 +130,9 @@ def crawling(cycles: float) -> Run:
             "slip_loss": (("time", "segment"), loss),
             "center_of_mass": (("time", "axis"), center),
         },
-        coords={"time": time, "axis": ["x", "y", "z"]},
+        coords={"time": time, "axis": ["x", "y", "z"], "frame_time": ("frame", [])},
     )
-    return Run(Path("run.nc"), data, check_config({}), "complete", "")
+    return Run(Path("run.nc"), {}, {}, check_config({}), "complete", "").with_data(data)
 
 
 def test_the_cost_of_slip_is_that_of_whole_cycles_behind_the_first() -> None:

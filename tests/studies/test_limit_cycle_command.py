@@ -17,16 +17,7 @@ def test_json_holds_the_numbers_and_nothing_else(annelid: Command) -> None:
     assert len(response[0]) == len(read["states"]) == 21
 
 
-@pytest.mark.parametrize(
-    ("arguments", "says"),
-    [
-        (("riddle2023-rods",), "choose the body riddle2022"),
-        (("--set", "sensor.noise_m=0.001"), "set sensor.noise_m=0"),
-        (("--neuron", "contractoin_1"), "did you mean 'contraction_1'"),
-        (("--segments", "2"), "at least 3"),
-    ],
-)
-def test_bad_input_ends_in_one_sentence(annelid: Command, arguments: tuple[str, ...], says: str) -> None:
-    done = annelid("study", "limit-cycle", *arguments)
+def test_bad_input_ends_in_one_sentence(annelid: Command) -> None:
+    done = annelid("study", "limit-cycle", "--neuron", "contractoin_1")
     assert done.exit_code == 2
-    assert says in done.sentence()
+    assert "did you mean 'contraction_1'" in done.sentence()

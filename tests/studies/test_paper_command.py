@@ -88,13 +88,6 @@ def test_refuses_before_anything_is_computed(
     assert asked == []
 
 
-def test_an_unknown_examination_is_one_sentence(annelid: Command) -> None:
-    done = annelid("paper", "--only", "pegs")
-    assert done.exit_code == 2
-    assert "pegs" in done.sentence()
-    assert not Path("report/runs").exists()
-
-
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -169,8 +162,3 @@ def test_on_a_terminal_progress_is_a_bar(monkeypatch: pytest.MonkeyPatch) -> Non
         progress("running [worms]", 3, 7, 0.4)
     assert "running [worms]" in stream.getvalue()
     assert "3 of 7 runs" in stream.getvalue()
-
-
-def test_quiet_reports_to_nobody() -> None:
-    with study_progress(quiet=True) as progress:
-        assert progress is None

@@ -57,9 +57,8 @@ def test_a_second_call_runs_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
 @pytest.fixture
 def drawn(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A whole report of two figures, of which one is rendered, and no claims."""
+    """A whole report of two figures and no claims."""
     monkeypatch.setattr(paper, "FIGURES", dict.fromkeys((4, 5), lambda run, series, stem: "a caption"))
-    monkeypatch.setattr(paper.renderings, "rendering_works", lambda: True)
     monkeypatch.setattr(paper, "claim_cases", lambda effort: [])
     monkeypatch.setattr(paper, "paper_claims", lambda evidence: [])
     monkeypatch.setattr(paper, "rule", lambda evidence: [])
@@ -77,18 +76,6 @@ def test_progress_tells_stage_and_ends_at_the_whole(tmp_path: Path) -> None:
     ]
     assert told[-1][3] == 1.0
     assert all(0 <= share <= 1 for *_, share in told)
-
-
-@pytest.mark.usefixtures("tiny", "drawn")
-@pytest.mark.parametrize("works", [True, False])
-def test_a_report_without_opengl_says_what_it_lacks(
-    works: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(paper.renderings, "rendering_works", lambda: works)
-    report = paper.reproduce(tmp_path, "quick")
-    assert [figure.number for figure in report.figures] == ([4, 5] if works else [5])
-    told = "Figures 4 and 8 need OpenGL, which this machine lacks (`annelid doctor`)."
-    assert (told in report.summary) is not works
 
 
 def test_an_unknown_examination_is_named_with_the_valid_ones(tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from annelid.config import load_config, preset_names
+from annelid.draw.strands import POINTS_PER_SIDE
 from annelid.errors import ConfigError, RunFileError
 from annelid.live.history import History, Moment, history_of
 from annelid.live.lines_and_arrows import Painter
@@ -67,8 +68,8 @@ def test_a_picture_has_every_part() -> None:
     lift = np.zeros((3, 3))
     lift[1, 2] = painter.arrow_N
     picture = painter.paint(moment(anatomy.model.qpos0, 3, lift))
-    strands, vertices, _ = anatomy.geometry.vertices_m.shape
-    assert picture.strands.shape == (strands * (vertices - 1), 2, 3) == painter.strand_colors().shape
+    pieces = POINTS_PER_SIDE * (len(anatomy.geometry.crossing_vertex) + 1)
+    assert picture.strands.shape == (anatomy.geometry.n_strands * pieces, 2, 3) == painter.strand_colors().shape
     assert picture.springs.shape == (len(anatomy.geometry.springs), 2, 3) == picture.spring_colors.shape
     assert picture.rings.shape == picture.ring_colors.shape
     arrows = picture.contacts[:, 1] - picture.contacts[:, 0]

@@ -19,7 +19,7 @@ from annelid.draw import gl
 from annelid.draw.notebook import Picture
 from annelid.errors import RenderingUnavailable, RunFileError
 from annelid.simulation.runfile import Run
-from annelid_studies.riddle2023.figures.renderings import rendering_works
+from opengl import rendering_works
 
 QUICK_START = Path(__file__).parents[2] / "docs" / "tutorials" / "quick_start.ipynb"
 
@@ -107,7 +107,7 @@ def test_words_of_a_run_are_escaped_and_nothing_of_it_fails(planar_run: Run, tmp
     config = planar_run.config.model_copy(update={"name": evil, "published": None})
     attacked = replace(planar_run, config=config, warnings=(evil,), path=tmp_path / evil.replace("/", "") / "run.nc")
     assert "script" not in Tags(html_of(attacked)).tags
-    nothing = replace(attacked, data=planar_run.data.isel(time=slice(0), frame=slice(0)))
+    nothing = attacked.with_data(planar_run.data.isel(time=slice(0), frame=slice(0)))
     html = html_of(nothing)
     assert "script" not in Tags(html).tags
     assert "not shown: " in html

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from itertools import combinations
 from pathlib import Path
@@ -11,6 +12,7 @@ import imageio.v3
 import numpy as np
 import pytest
 
+import annelid
 from annelid.body import Rings
 from annelid.body.worm import WormBody
 from annelid.config import load_config
@@ -27,6 +29,7 @@ from annelid.nervous import Network
 from annelid.nervous.neurons import GapJunction, Neuron, Synapse, persistent_sodium
 from annelid.nervous.peristalsis import peristalsis_network
 from annelid.nervous.robust import robust_network
+from annelid.simulation.runfile import Run
 from annelid_studies.riddle2023.figures import muscle_surface, robot_lengths
 
 
@@ -129,6 +132,20 @@ def test_every_part_of_a_network_is_drawn_exactly_once_and_connections_avoid_oth
             assert all(abs(route - place).min() > 0.28 for place in others)
 
 
+def test_a_neuron_has_one_colour_in_the_network_of_a_run_and_in_its_trace(planar_run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "network.svg"
+    annelid.plot(planar_run, path, figure="network")
+    colors = {
+        node.get("id", ""): re.findall("stroke: (#[0-9a-f]{6})", ElementTree.tostring(node, encoding="unicode"))
+        for node in ElementTree.parse(path).iter()
+        if node.get("id", "").startswith(("neuron-", "trace-"))
+    }
+    n = planar_run.data.sizes["neuron"]
+    assert set(colors) == {f"{what}-{i}" for what in ("neuron", "trace") for i in range(n)}
+    assert all(colors[f"neuron-{i}"] == colors[f"trace-{i}"] for i in range(n))
+    assert len({*map(tuple, colors.values())}) == 4, "contraction, expansion, sensory and relay"
+
+
 def test_segments_are_columns_from_left_to_right_and_other_neurons_stand_below() -> None:
     network = robust_network(12)
     places = place_neurons(network)
@@ -151,7 +168,7 @@ def test_long_names_are_shortened_and_explained() -> None:
     for name in ("left", "half_centre_1", "half_centre_2"):
         network.add_neuron(name, Neuron())
     assert labels_of(network) == {"left": "left", "half_centre_1": "hal", "half_centre_2": "hal"}
-    assert meanings_of(network) == ["hal: half_centre"]
+    assert meanings_of(network) == {"hal": "half_centre"}
 
 
 # Figure 9

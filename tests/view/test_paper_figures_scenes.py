@@ -7,25 +7,19 @@ import numpy as np
 import pytest
 
 from annelid.body.worm import WormBody
-from annelid.config import load_config
-from annelid.draw.camera import picture_axes
-from annelid.draw.scene import render_still
+from annelid.draw.strands import POINTS_PER_SIDE
 from annelid.errors import ConfigError, RunFileError
 from annelid.morphology import MeshGeometry
 from annelid.simulation.runfile import Run
 from annelid_studies.riddle2023.figures.propagation import figure_8_propagation, measure_propagation
 from annelid_studies.riddle2023.figures.renderings import (
-    ISOMETRIC_DEG,
     figure_4_model,
     recorded_posture,
-    rendering_works,
-    rest_posture,
     rhombus_outline,
 )
 from annelid_studies.riddle2023.figures.rhombi import actuated, rhombus_plane
 
 LATE_S = 0.2
-needs_gl = pytest.mark.skipif(not rendering_works(), reason="no OpenGL back-end works on this machine")
 
 
 def mesh(run: Run) -> MeshGeometry:
@@ -34,12 +28,11 @@ def mesh(run: Run) -> MeshGeometry:
 
 
 def check_files(png: Path) -> None:
-    """Both files are there, the picture has ink on white, and the SVG embeds what was rendered."""
+    """Both files are there, and the picture has ink on white."""
     assert png.suffix == ".png"
     pixels = imageio.v3.imread(png)[..., :3]
     assert 0.02 < (pixels < 200).any(axis=-1).mean() < 0.6
     drawing = png.with_suffix(".svg").read_text(encoding="utf-8")
-    assert "<image" in drawing
     assert drawing.count("<path") > 20
 
 
@@ -48,55 +41,23 @@ def test_strands_of_a_recorded_posture_pass_through_the_pins(rods_run: Run) -> N
     geometry = posture.geometry
     assert np.abs(posture.crossings_m - geometry.crossings_m).max() > 0.005, "it has moved"
     for crossing, strands in enumerate(geometry.crossing_strands):
-        vertex = geometry.crossing_vertex[geometry.crossing_plane[crossing]]
+        point = POINTS_PER_SIDE * (geometry.crossing_plane[crossing] + 1)
         for strand in strands:
-            np.testing.assert_allclose(posture.strands_m[strand, vertex], posture.crossings_m[crossing], atol=1e-6)
+            np.testing.assert_allclose(posture.strands_m[strand, point], posture.crossings_m[crossing], atol=1e-6)
 
 
 def test_an_outline_visits_the_rhombus_corners_and_closes(rods_run: Run) -> None:
     posture = recorded_posture(rods_run, LATE_S)
-    per_side = rods_run.config.body.mesh.elements_per_side  # type: ignore[union-attr]
     for rhombus in (0, 17, len(posture.geometry.rhombi) - 1):
         line = rhombus_outline(posture, rhombus)
-        assert len(line) == 4 * per_side + 1
+        assert len(line) == 4 * POINTS_PER_SIDE + 1
         np.testing.assert_array_equal(line[0], line[-1])
-        np.testing.assert_array_equal(line[:-1:per_side], posture.crossings_m[posture.geometry.rhombi[rhombus]])
+        np.testing.assert_array_equal(line[:-1:POINTS_PER_SIDE], posture.crossings_m[posture.geometry.rhombi[rhombus]])
         steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
         assert steps.max() < 1.5 * steps.min(), "it follows the strands and does not jump"
 
 
-@needs_gl
-def test_marks_lie_on_what_was_rendered() -> None:
-    config = load_config("riddle2023-rods")
-    still = render_still(config, ISOMETRIC_DEG, (800, 600))
-    posture = rest_posture(config)
-    outward = posture.crossings_m - [0.0, 0.0, posture.geometry.radius_m]
-    outward[:, 0] = 0.0
-    towards = outward @ -picture_axes(*ISOMETRIC_DEG)[2] / posture.geometry.radius_m
-    columns, rows = np.rint(still.places(posture.crossings_m[towards > 0.5])).astype(int).T
-    assert len(columns) > 15
-
-    def share_of_grey(shift: int) -> float:
-        colors = still.pixels[rows, columns + shift].astype(int)
-        return float(((np.ptp(colors, axis=1) < 40) & (colors.max(axis=1) < 180)).mean())
-
-    assert share_of_grey(0) == 1.0, "pins that face the camera"
-    assert max(share_of_grey(-9), share_of_grey(9)) < 0.3, "beside them"
-
-
-@needs_gl
-def test_on_a_slope_the_places_of_the_worm_span_its_pixels() -> None:
-    config = load_config("riddle2023-rods", {"arena.slope_deg": 30})
-    still = render_still(config, ISOMETRIC_DEG, (800, 600))
-    places = still.places(rest_posture(config).strands_m).reshape(-1, 2)
-    rows, columns = np.nonzero(still.pixels.min(axis=-1) < 240)
-    for drawn, found in zip((columns, rows), places.T, strict=True):
-        assert [found.min(), found.max()] == pytest.approx([drawn.min(), drawn.max()], abs=10.0)
-
-
-@pytest.mark.slow
-@needs_gl
-def test_figures_4_and_8_are_rendered(rods_run: Run, tmp_path: Path) -> None:
+def test_figures_4_and_8_are_drawn(rods_run: Run, tmp_path: Path) -> None:
     captions = [
         figure_4_model(rods_run.config, tmp_path / "figure_4"),
         figure_8_propagation(rods_run, tmp_path / "figure_8", LATE_S),

@@ -2,7 +2,6 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import imageio.v3
@@ -31,7 +30,7 @@ def test_figure7_is_a_picture_with_curves_on_white(planar_run: Run, picture: Pat
 
 def test_neurons_of_any_name_are_drawn(planar_run: Run, picture: Path) -> None:
     n = planar_run.data.sizes["neuron"]
-    own = replace(planar_run, data=planar_run.data.assign_coords(neuron=[f"cell {i}" for i in range(n)]))
+    own = planar_run.with_data(planar_run.data.assign_coords(neuron=[f"cell {i}" for i in range(n)]))
     figure7(own, picture)
     pixels = imageio.v3.imread(picture)[:400, :, :3].astype(int)
     for color in segment_colors(min(n, 16)):
@@ -39,7 +38,7 @@ def test_neurons_of_any_name_are_drawn(planar_run: Run, picture: Path) -> None:
 
 
 def test_published_levels_are_drawn_under_the_papers_controller_only(rods_run: Run, picture: Path) -> None:
-    own = replace(rods_run, data=rods_run.data.assign_attrs(controller="mine"))
+    own = rods_run.with_data(rods_run.data.assign_attrs(controller="mine"))
     pictures = [imageio.v3.imread(figure7(run, picture))[-400:] for run in (rods_run, own)]
     assert pictures[0].shape != pictures[1].shape or (pictures[0] != pictures[1]).any()
     assert published(rods_run.config)
@@ -74,7 +73,7 @@ def test_figure7_leaves_pyplot_and_the_users_settings_alone(planar_run: Run, pic
 
 
 def test_a_run_without_samples_is_refused_in_a_sentence(planar_run: Run, picture: Path) -> None:
-    empty = replace(planar_run, data=planar_run.data.isel(time=slice(0, 1)))
+    empty = planar_run.with_data(planar_run.data.isel(time=slice(0, 1)))
     with pytest.raises(RunFileError, match="too little to plot"):
         figure7(empty, picture)
     assert not picture.exists()

@@ -18,9 +18,7 @@ from annelid.draw.scene import WormScene
 from annelid.errors import MissingDependency, RunFileError
 from annelid.simulation.loop import simulate
 from annelid.simulation.runfile import Run
-from annelid_studies.riddle2023.figures.renderings import rendering_works
-
-needs_gl = pytest.mark.skipif(not rendering_works(), reason="no OpenGL back-end works on this machine")
+from opengl import needs_gl
 
 
 def reddish(pixels: np.ndarray) -> np.ndarray:
@@ -217,6 +215,6 @@ def test_soft_crossings_have_a_bar_to_each_strand() -> None:
         worm = DrawnWorm(config)
         worm.pose(worm.model.qpos0)
         scene = mujoco.MjvScene(worm.model, maxgeom=1000)
-        worm.add_links(scene)
+        worm.complete(scene)
         assert scene.ngeom == n_links * config.body.geometry().n_crossings
         assert ("soft" in worm.legend()[-1][0]) == (n_links > 0)

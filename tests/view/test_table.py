@@ -114,7 +114,9 @@ def test_a_run_that_was_cut_short_and_other_worms_claim_nothing() -> None:
     assert "reproduces" not in closing_sentence(replace(formulation(), status="interrupted"), FAST)
     assert "reproduces" not in closing_sentence(formulation(), FAST, "a function from Python")
     assert not any(row.reference for row in summary_rows(formulation(), FAST, "a function from Python"))
-    assert closing_sentence(replace(formulation(), status="stopped_by_guard"), FAST) == "stopped by guard after 5 s"
+    stopped = replace(formulation(), status="stopped_by_guard")
+    assert closing_sentence(stopped, FAST) == "stopped by guard after 5 s"
+    assert [row.ours for row in summary_rows(stopped, FAST) if row.label == "warnings"] == ["stopped by guard"]
     for preset in ("riddle2023", "riddle2023-rods", "riddle2022-planar", "crawler"):
         assert "reproduces" not in closing_sentence(formulation(), load_config(preset))
 

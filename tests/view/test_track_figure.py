@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import imageio.v3
@@ -34,7 +33,7 @@ def test_the_track_has_the_worm_its_front_and_its_waypoints(tmp_path: Path, pict
 def test_it_refuses_what_has_no_track(rods_run: Run, planar_run: Run, picture: Path) -> None:
     with pytest.raises(RunFileError, match="only the 3D worm"):
         track_figure(planar_run, picture)
-    short = replace(rods_run, data=rods_run.data.isel(frame=slice(1)))
+    short = rods_run.with_data(rods_run.data.isel(frame=slice(1)))
     with pytest.raises(RunFileError, match="fewer than two recorded postures"):
         track_figure(short, picture)
     assert not picture.exists()

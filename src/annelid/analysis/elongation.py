@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike
 
 from annelid.analysis.numbers import finite, finite_each, number
+from annelid.simulation.runfile import Recorded
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,17 +42,17 @@ class Elongation:
     )
 
 
-def elongation(data: xr.Dataset) -> Elongation:
+def elongation(data: Mapping[str, Recorded]) -> Elongation:
     """Reads the elongation of every segment from a run's signals.
 
     The paper does not say how it read its Fig. 7; its numbers come out as the peak to peak on the first helix.
     """
-    if "stretch_length" not in data or not data.sizes.get("time"):
+    if "stretch_length" not in data or not data["time"].values.size:
         return Elongation()
     stretch, rest = data["stretch_length"].values, data["stretch_rest_length"].values
     peak_to_peak = np.ptp(stretch, axis=0)
     first_helix, mean = peak_to_peak[:, 0], stretch.mean(axis=2).max(axis=0) - rest.mean(axis=1)
-    several = data.sizes["sensor"] > 1
+    several = stretch.shape[2] > 1
     return Elongation(
         elongation_first_helix_pp_m=finite_each(first_helix),
         elongation_least_pp_m=finite_each(peak_to_peak.min(axis=1)) if several else None,

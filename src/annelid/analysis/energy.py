@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import xarray as xr
 
 from annelid.analysis.numbers import number
+from annelid.simulation.runfile import Recorded
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,11 +32,11 @@ class Energy:
     energy_numerical_share: float | None = number("that over the muscles' work")
 
 
-def energy_balance(data: xr.Dataset) -> Energy:
+def energy_balance(data: Mapping[str, Recorded]) -> Energy:
     """Reads the balance from a run's signals; all is None without energies, or without two samples."""
     recorded = ("muscle_work", "kinetic_energy", "elastic_energy", "damping_loss")
     optional = ("potential_energy", "slip_loss", "constraint_loss")
-    if any(name not in data for name in recorded) or data.sizes.get("time", 0) < 2:
+    if any(name not in data for name in recorded) or data["time"].values.size < 2:
         return Energy()
     work, kinetic, elastic, damping = (_summed_gain(data, name) for name in recorded)
     potential, slip, constraint = (_summed_gain(data, name) if name in data else None for name in optional)
@@ -54,7 +55,7 @@ def energy_balance(data: xr.Dataset) -> Energy:
     )
 
 
-def _summed_gain(data: xr.Dataset, name: str) -> float:
+def _summed_gain(data: Mapping[str, Recorded], name: str) -> float:
     """What a signal, summed over muscles or segments, has gained from the first sample to the last."""
     ends = data[name].values[[0, -1]]
     return float(np.sum(ends[1]) - np.sum(ends[0]))

@@ -7,7 +7,6 @@ docs/evidence/gait.md has the definitions with their formulae and sources.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -68,14 +67,6 @@ class Gait:
         "m",
     )
 
-    if not TYPE_CHECKING:
-
-        def __getattr__(self, name: str) -> Any:
-            """Says where numbers of before are now."""
-            now = {"period_s": "gait_period_s", "energy": "energy_muscle_work_J and others of annelid.summary(run)"}
-            hint = f": it is now {now[name]}" if name in now else ""
-            raise AttributeError(f"{type(self).__name__} has no {name}{hint}")
-
 
 def gait(run: Run) -> Gait:
     """Reads the locomotion metrics of a run, opened with `annelid.open_run`.
@@ -83,24 +74,26 @@ def gait(run: Run) -> Gait:
     All is None where there is no complete cycle behind the first one.
     """
     marks = cycle_marks(run)
-    if marks.size < 2 or "center_of_mass" not in run.data:
+    if marks.size < 2 or "center_of_mass" not in run.variables:
         return Gait()
-    time = run.data["time"].values
-    data = run.data.isel(time=np.flatnonzero((time >= marks[0]) & (time <= marks[-1])))
+    time = run.variables["time"].values
+    inside = (time >= marks[0]) & (time <= marks[-1])
+    signals = {name: one for name, one in run.variables.items() if one.dims[:1] == ("time",)}
+    data = {name: one._replace(values=one.values[inside]) for name, one in signals.items()}
     duration, cycles = float(marks[-1] - marks[0]), marks.size - 1
-    centre = data["center_of_mass"].sel(axis=["x", "y"]).values
+    centre = data["center_of_mass"].values[:, :2]
     steps, headings = _steps(run, marks)
     left = steps[:, 1] * headings[:, 0] - steps[:, 0] * headings[:, 1]
     forwards, path = float((steps * headings).sum(axis=1).sum()), float(np.hypot(*steps.T).sum())
     # Along the mean heading of the window.
     moves = np.diff(centre @ _steps(run, data["time"].values[[0, -1]])[1][0])
-    length_m = data.attrs.get("body_length_m")
-    mass_kg, arena = data.attrs.get("total_mass_kg"), run.config.arena
+    length_m = run.attrs.get("body_length_m")
+    mass_kg, arena = run.attrs.get("total_mass_kg"), run.config.arena
     push_J = None if mass_kg is None or arena is None else mass_kg * arena.gravity_m_per_s2 * path
     works = (muscle_work(data, positive=positive) for positive in (True, False))
     positive_J, net_J = (None if work is None else float(work.sum()) for work in works)
     slid_m = float(np.ptp(data["slip_distance"].values, axis=0).mean()) if "slip_distance" in data else None
-    touches = (data["contact_force"] != 0.0).any("axis") if "contact_force" in data else None
+    touches = (data["contact_force"].values != 0.0).any(axis=2) if "contact_force" in data else None
     angles = np.unwrap(np.arctan2(headings[:, 1], headings[:, 0]))
     circle = fitted_circle(centre)
     return Gait(
@@ -112,7 +105,7 @@ def gait(run: Run) -> Gait:
         speed_body_lengths_per_s=ratio(forwards / duration, length_m),
         stride_m=ratio(forwards, cycles),
         stride_body_lengths=ratio(forwards / cycles, length_m),
-        contact_duty=None if touches is None else touches.mean("time").values.tolist(),
+        contact_duty=None if touches is None else touches.mean(axis=0).tolist(),
         slip_ratio=ratio(slid_m, path),
         backward_ratio=ratio(float(-moves[moves < 0].sum()), float(moves[moves > 0].sum())),
         cost_of_transport=ratio(positive_J, push_J),
@@ -132,10 +125,10 @@ def cycle_marks(run: Run) -> Array:
 
 def _steps(run: Run, marks: Array) -> tuple[Array, Array]:
     """Displacement of the centre of mass and mean heading in each cycle, seen from above, ``(n_cycles, 2)`` each."""
-    time = run.data["time"].values
-    centre = run.data["center_of_mass"].sel(axis=["x", "y"]).values
+    time = run.variables["time"].values
+    centre = run.variables["center_of_mass"].values[:, :2]
     steps = np.diff(np.array([np.interp(marks, time, along) for along in centre.T]).T, axis=0)
-    if run.config.body.geometry() is None or run.data.sizes.get("frame", 0) < 2:
+    if run.config.body.geometry() is None or run.variables["frame_time"].values.size < 2:
         return steps, np.broadcast_to(FORWARDS, steps.shape)
     track = track_of(run)
     # Evenly over each cycle, whatever the interval of the frames.

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import xarray as xr
 
 from annelid.analysis.numbers import finite, finite_each, number
 from annelid.analysis.rhythm import CONTRACTED
 from annelid.protocols import Array
+from annelid.simulation.runfile import Recorded
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,7 +36,7 @@ class Muscles:
     )
 
 
-def muscles(data: xr.Dataset, n_segments: int) -> Muscles:
+def muscles(data: Mapping[str, Recorded], n_segments: int) -> Muscles:
     """Reads forces and work from a run's signals.
 
     Args:
@@ -55,14 +56,14 @@ def muscles(data: xr.Dataset, n_segments: int) -> Muscles:
     )
 
 
-def muscle_work(data: xr.Dataset, *, positive: bool = False) -> Array | None:
+def muscle_work(data: Mapping[str, Recorded], *, positive: bool = False) -> Array | None:
     """Returns the work of every muscle on the body from a run's first sample to its last, J, ``(n_muscles,)``.
 
     What a muscle takes up while it is lengthened is subtracted, or with ``positive`` not regained. Where no such sum is
     recorded, the changes from sample to sample are added; without work they are force over shortening, or None.
     """
     recorded, least_J = ("positive_work", 0.0) if positive else ("muscle_work", -np.inf)
-    if not data.sizes.get("time"):
+    if not data["time"].values.size:
         return None
     if recorded in data:
         values = data[recorded].values
@@ -77,7 +78,7 @@ def muscle_work(data: xr.Dataset, *, positive: bool = False) -> Array | None:
     return steps.clip(least_J).sum(axis=0)
 
 
-def cable_work(data: xr.Dataset) -> float | None:
+def cable_work(data: Mapping[str, Recorded]) -> float | None:
     """Adds force times half of every change of length, J; a sample's force acted during the step before it."""
     if "muscle_force" not in data or "ring_length" not in data:
         return None
@@ -85,13 +86,13 @@ def cable_work(data: xr.Dataset) -> float | None:
     return float((data["muscle_force"].values[1:] * changes).sum() / 2)
 
 
-def _contraction_forces(data: xr.Dataset, n_segments: int) -> list[Array]:
+def _contraction_forces(data: Mapping[str, Recorded], n_segments: int) -> list[Array]:
     """Forces of all samples in which the muscle itself is contracted, an array per segment; empty without forces.
 
     The short transient at each onset is in there: it sets the peak and hardly moves the median.
     """
     if "muscle_force" not in data or "activation" not in data:
         return []
-    own = np.split(np.arange(data.sizes["muscle"]), n_segments)
     force, contracted = data["muscle_force"].values, data["activation"].values > CONTRACTED
+    own = np.split(np.arange(force.shape[1]), n_segments)
     return [force[:, one][contracted[:, one]] for one in own]

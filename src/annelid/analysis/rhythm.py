@@ -162,8 +162,8 @@ def rhythm(time_s: ArrayLike, activation: ArrayLike) -> Rhythm:
 
 def run_rhythm(run: Run) -> Rhythm:
     """Describes the rhythm in which a run's muscles are activated, without its score; empty without samples of it."""
-    data = run.data
-    if "activation" not in data or not data.sizes.get("time"):
+    data = run.variables
+    if "activation" not in data or not data["time"].values.size:
         return Rhythm()
     return rhythm(data["time"].values, segment_activation(data["activation"].values, run.config.body.n_segments))
 
@@ -171,7 +171,7 @@ def run_rhythm(run: Run) -> Rhythm:
 def scored_rhythm(run: Run) -> Rhythm:
     """Describes the rhythm of a run with the score of the whole of it, where there is one."""
     found = run_rhythm(run)
-    if "activation" not in run.data or run.config.body.n_segments < LEAST_SEGMENTS:
+    if "activation" not in run.variables or run.config.body.n_segments < LEAST_SEGMENTS:
         return found
     score = rhythm_score(run)
     return replace(found, rhythm_verdict=score.verdict, rhythm_reason=score.reason, rhythm_regularity=score.regularity)
@@ -207,7 +207,7 @@ def rhythm_score(run: Run, after_s: float = 0.0) -> RhythmScore:
     times, judged = _judged(run, "activation", after_s)
     network = paper_controller(run.config.controller)
     gate_ms = network.gate_time_constant_ms if network is not None else _DESIGN_GATE_MS
-    activation = segment_activation(run.data["activation"].values, run.config.body.n_segments)
+    activation = segment_activation(run.variables["activation"].values, run.config.body.n_segments)
     return score(times, activation[judged], DESIGN_INTERVAL_S * gate_ms / _DESIGN_GATE_MS)
 
 
@@ -225,17 +225,17 @@ def lengthening_score(run: Run, after_s: float = 0.0) -> RhythmScore:
         ValueError: The run file holds no stretch sensors.
     """
     times, judged = _judged(run, "stretch_length", after_s)
-    lengthening = (run.data["stretch_length"] - run.data["stretch_rest_length"]).mean("sensor")
-    lengthening = lengthening.transpose("time", "segment").values[judged]
+    stretch, rest = (run.variables[name].values for name in ("stretch_length", "stretch_rest_length"))
+    lengthening = (stretch - rest).mean(axis=2)[judged]
     largest = np.maximum(lengthening.max(axis=0, initial=0.0), 2.0 * LEAST_LENGTHENING_M)
     return score(times, lengthening / largest)
 
 
 def _judged(run: Run, signal: str, after_s: float) -> tuple[Array, NDArray[np.bool_]]:
     """Times of the samples from one on, and which of all they are."""
-    if signal not in run.data:
+    if signal not in run.variables:
         raise ValueError(f"{run.path} holds no {signal}")
-    times = run.data["time"].values
+    times = run.variables["time"].values
     judged = times >= after_s
     return times[judged], judged
 

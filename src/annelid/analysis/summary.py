@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import xarray as xr
 
 from annelid.analysis.elongation import Elongation, elongation
 from annelid.analysis.energy import Energy, energy_balance
@@ -17,7 +16,7 @@ from annelid.analysis.muscles import Muscles, muscles
 from annelid.analysis.numbers import Number, finite, number, numbers_of
 from annelid.analysis.rhythm import Rhythm, scored_rhythm
 from annelid.analysis.track import Travel, travel
-from annelid.simulation.runfile import Run
+from annelid.simulation.runfile import Recorded, Run
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,7 +67,7 @@ def summary(run: Run) -> Summary:
 
     Quantities whose variables the file lacks (a planar run has no edges) are None.
     """
-    data, n_segments = run.data, run.config.body.n_segments
+    data, n_segments = run.variables, run.config.body.n_segments
     sections = (
         scored_rhythm(run),
         elongation(data),
@@ -82,18 +81,18 @@ def summary(run: Run) -> Summary:
         name=run.config.name,
         status=run.status,
         n_segments=n_segments,
-        duration_s=finite(np.ptp(data["time"].values)) if data.sizes.get("time") else None,
+        duration_s=finite(np.ptp(data["time"].values)) if data["time"].values.size else None,
         real_time_factor=finite(run.real_time_factor),
         warnings=run.warnings,
         **{name: value for section in sections for name, value in vars(section).items()},
     )
 
 
-def _mesh(data: xr.Dataset, n_segments: int) -> Mesh:
+def _mesh(data: Mapping[str, Recorded], n_segments: int) -> Mesh:
     shortest = None
-    if "ring_length" in data and data.sizes.get("time"):
+    if "ring_length" in data and data["time"].values.size:
         # A ring of two halves is as long as both.
-        shortest = data["ring_length"].values.reshape(data.sizes["time"], n_segments, -1).sum(axis=2).min()
+        shortest = data["ring_length"].values.reshape(data["time"].values.size, n_segments, -1).sum(axis=2).min()
     return Mesh(
         ring_length_min_m=finite(shortest),
         edge_strain_max=_largest(data, "edge_strain"),
@@ -101,5 +100,5 @@ def _mesh(data: xr.Dataset, n_segments: int) -> Mesh:
     )
 
 
-def _largest(data: xr.Dataset, name: str) -> float | None:
-    return finite(data[name].values.max()) if name in data and data[name].size else None
+def _largest(data: Mapping[str, Recorded], name: str) -> float | None:
+    return finite(data[name].values.max()) if name in data and data[name].values.size else None

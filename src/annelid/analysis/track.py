@@ -21,7 +21,7 @@ _CLEARLY = 3.0
 
 def forward_position(run: Run) -> Array:
     """Returns the position of the centre of mass along the initial heading, m from the origin, ``(n_times,)``."""
-    along: Array = -run.data["center_of_mass"].sel(axis="x").values
+    along: Array = -run.variables["center_of_mass"].values[:, 0]
     return along
 
 
@@ -35,7 +35,7 @@ class Travel:
 
 def travel(run: Run) -> Travel:
     """Reads the travel of a run; None for a worm that stays in its place or was not recorded."""
-    if "center_of_mass" not in run.data or not run.data.sizes.get("time"):
+    if "center_of_mass" not in run.variables or not run.variables["time"].values.size:
         return Travel()
     ahead = forward_position(run)
     return Travel(travel_m=finite(ahead[-1] - ahead[0]), travel_path_m=finite(np.abs(np.diff(ahead)).sum()))
@@ -114,10 +114,10 @@ def track_of(run: Run) -> Track:
     Raises:
         RunFileError: The run is of a body without a mesh, or has fewer than two recorded postures.
     """
-    geometry, data = run.config.body.geometry(), run.data
+    geometry, data = run.config.body.geometry(), run.variables
     if geometry is None:
         raise RunFileError(f"{run.path} has no track: only the 3D worm (body.kind = 'worm') records one")
-    if data.sizes.get("frame", 0) < 2 or "crossing_position" not in data:
+    if "crossing_position" not in data or data["frame_time"].values.size < 2:
         raise RunFileError(f"{run.path} holds fewer than two recorded postures, and so no track")
     rings = tuple(geometry.ring_planes.tolist())
     return Track(data["frame_time"].values, data["crossing_position"].values, geometry.n_per_plane, rings)
@@ -133,9 +133,9 @@ def nearest_frame(run: Run, time_s: float) -> int:
     Raises:
         RunFileError: No postures recorded, or the time lies more than a frame's interval outside of them.
     """
-    if "crossing_position" not in run.data or run.data.sizes.get("frame", 0) == 0:
+    if "crossing_position" not in run.variables or not run.variables["frame_time"].values.size:
         raise RunFileError(f"{run.path} holds no recorded postures of a 3D worm")
-    return nearest_time(run, run.data["frame_time"].values, time_s)
+    return nearest_time(run, run.variables["frame_time"].values, time_s)
 
 
 def nearest_time(run: Run, times_s: Array, time_s: float) -> int:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from annelid.body.actuators.muscle import Rings, muscle_force
     from annelid.body.actuators.servo import ServoRings, wrap_factors
     from annelid.body.assemble import build_spec, compile_robot, compile_spec, robot_spec
-    from annelid.body.estimates import bearable_force_N, rhombus_of
+    from annelid.body.estimates import bearable_force_N, longest_step_s, rhombus_of
     from annelid.body.formulations import FormulationKind
     from annelid.body.formulations.rods import Rods
     from annelid.body.mesh import Mesh
@@ -41,6 +41,7 @@ __all__ = [
     "compile_robot",
     "compile_spec",
     "crossing_site",
+    "longest_step_s",
     "muscle_force",
     "rhombus_of",
     "ring_names",

@@ -140,7 +140,7 @@ def compile_spec(spec: mujoco.MjSpec) -> mujoco.MjModel:
         reason = str(error).splitlines()[0].removeprefix("Error: ")
         remedy = next((f"{remedy} ({reason})" for words, remedy in _REMEDIES.items() if words in reason), reason)
         raise ConfigError(f"the engine refuses this body: {remedy}") from None
-    moving = np.unique(model.dof_bodyid).size
+    moving = len({*model.dof_bodyid.tolist()})
     if model.nflex and moving > MOST_ORDERED_BODIES:
         warnings.warn(
             f"the worm has {moving} moving bodies: above {MOST_ORDERED_BODIES} the engine takes fifty times as long "

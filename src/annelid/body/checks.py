@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from math import degrees, hypot, pi, radians, tan
 
-from annelid.body.estimates import WALKS_FROM, rhombus_of, soft_constraint
+from annelid.body.estimates import WALKS_FROM, longest_step_s, rhombus_of, soft_constraint
 from annelid.body.mesh import MeshBody
 from annelid.config.answers import Finding
 from annelid.config.run import RunConfig
@@ -81,10 +81,13 @@ def material_findings(body: MeshBody) -> Iterator[Finding]:
             yield Finding(f"body.strands.{field}", value, problem, f"set between {least:.2g} and {most:.2g}")
 
 
-def ground_findings(config: RunConfig, body: MeshBody) -> Iterator[Finding]:
-    """Checks the contacts against the physics step, and the friction against the slope."""
+def ground_findings(config: RunConfig, body: MeshBody, force_N: float) -> Iterator[Finding]:
+    """Checks the muscles' greatest force and contacts against the physics step, and the friction against the slope."""
     arena, step = config.arena, config.clock.physics_timestep_s
     assert arena is not None
+    if step > (longest := longest_step_s(body, force_N)):
+        problem = f"{force_N:.3g} N move segments as light as these too fast: the engine's solve may fail"
+        yield Finding("clock.physics_timestep_s", step, problem, f"set at most {longest:.2g}, or take weaker muscles")
     # Down to half a step contacts are up to twice as soft as asked, which has been measured; below nothing has.
     if arena.contact_time_constant_s < 0.5 * step:
         yield soft_constraint(

@@ -76,11 +76,6 @@ def add_tie(spec: mujoco.MjSpec, pin: str, point: str, tie: Tie) -> None:
         tendon.wrap_joint(f"{point}_{axis}", 1.0)
 
 
-def tied_bodies(model: mujoco.MjModel) -> NDArray[np.intp]:
-    """Returns the bodies of a pin and of a strand's vertex for every tie of a compiled model, ``(n_ties, 2)``."""
-    return model.jnt_bodyid[_ties(model)[1][:, ::3]].T.astype(np.intp)
-
-
 def _ties(model: mujoco.MjModel) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """The tendons of ties, ``(3 n_ties,)``, and the slides of pin and vertex that each holds together, ``(2, ..)``."""
     found = [i for i in range(model.ntendon) if model.tendon(i).name.startswith(_TIE)]

@@ -87,7 +87,7 @@ class WormBody(MeshBody):
         for segments, alike in groups:
             alone = config.model_copy(update={"body": alike})
             found = [*mesh_findings(alike), *alike.rings.findings(alike), *material_findings(alike)]
-            found += [*alike.formulation.findings(alone), *ground_findings(alone, alike)]
+            found += [*alike.formulation.findings(alone), *ground_findings(alone, alike, alike.rings.forces(1)[0])]
             of = f"segment {listed(str(segment + 1) for segment in segments)}: " if len(groups) > 1 else ""
             yield from (replace(one, problem=of + one.problem) for one in found)
             found = tolerance_findings(config, alike, window, lags=alike.rings.lags)

@@ -317,7 +317,7 @@ def print_run(run: Run, *, everything: bool = False, quiet: bool = False, check:
     checked = {} if check is None else {"check.json": check.to_dict()}
     if give_files([run.path], {run.path.name: numbers.to_dict(), **checked}) or quiet:
         return
-    moved, controller = None if check is None else check.cell, run.data.attrs.get("controller")
+    moved, controller = None if check is None else check.cell, run.attrs.get("controller")
     lines = [
         summary_table(numbers, run.config, controller, everything=everything, moved=moved),
         legend(run.config, controller),

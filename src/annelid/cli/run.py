@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import shlex
 import sys
 from collections.abc import Callable
 from contextlib import suppress
@@ -189,7 +190,8 @@ def run_command(
         raise SimulationStopped(f"{stop}; what was computed is in {left.path}") from None
     print_run(done, quiet=quiet, check=checked)
     if done.status == "interrupted":
-        complain(f"interrupted: what was computed is in {done.path}; continue it with: annelid run --resume {folder}")
+        go_on = f"annelid run --resume {shlex.quote(str(folder))}"
+        complain(f"interrupted: what was computed is in {done.path}; continue it with: {go_on}")
         raise typer.Exit(EXIT_INTERRUPTED)
     if quiet and not wants_json():
         print_paths([done.path])

@@ -119,8 +119,8 @@ def draw_command(
 
     Figures are .png, .pdf or .svg. figure7 has potentials and lengths, as in the paper. track has the paths of the
     worm's middle and front, with its outline at several times. network has the neurons and synapses of the controller,
-    with a key. Frames are drawn from the recorded postures, so this works later and on any machine. Those of a 3D worm
-    have a legend, the time and a scale bar. The bar is right at the distance of the worm's middle.
+    and their potentials below. Frames are drawn from the recorded postures, so this works later and on any machine.
+    Those of a 3D worm have a legend, the time and a scale bar, which is right at the distance of the worm's middle.
 
     \b
     annelid draw runs/riddle2023-001 -o figure7.pdf

@@ -10,6 +10,7 @@ from abc import abstractmethod
 from collections.abc import Iterator, Mapping
 from functools import cache
 from importlib import resources
+from math import radians
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
 from pydantic import AfterValidator, Field, model_validator
@@ -298,8 +299,8 @@ class ArenaKind(Kind):
 
     @property
     def slope_rad(self) -> float:
-        """How steeply the model's axes rise towards -x, rad."""
-        return 0.0
+        """How steeply the model's axes rise towards -x, rad; level without a field ``slope_deg``."""
+        return radians(getattr(self, "slope_deg", 0.0))
 
     @property
     @abstractmethod

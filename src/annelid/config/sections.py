@@ -60,7 +60,8 @@ class Section(BaseModel):
         segment_fields: Names of the fields of type `PerSegmentOf`.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    # Most of the kinds are in no configuration: pydantic completes a section when it is first used.
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
     segment_fields: ClassVar[tuple[str, ...]] = ()
 
     def of_each(self, name: str, n_segments: int) -> list[float]:

@@ -166,20 +166,20 @@ class InputTable:
         self._switches = np.arange(self.n_linear, len(rows))
 
     def currents(self, sensed: Array, first_step: int, on: NDArray[np.bool_]) -> tuple[Array, NDArray[np.bool_]]:
-        """Returns the inputs' currents at control steps, nA, for one network or many copies.
+        """Returns the inputs' currents at control steps, nA.
 
         Args:
-            sensed: What is sensed at each step, ``(n_steps, .., n_values + 1)``.
+            sensed: What is sensed at each step, ``(n_steps, n_values + 1)``.
             first_step: Number of the first step.
-            on: Which switches were on at the step before, ``(.., n_switches)``.
+            on: Which switches were on at the step before, ``(n_switches,)``.
 
         Returns:
-            Currents, ``(n_steps, .., n_inputs)``, and which switches are on at the last step, ``(.., n_switches)``.
+            Currents, ``(n_steps, n_inputs)``, and which switches are on at the last step, ``(n_switches,)``.
         """
-        inputs_nA = np.zeros((*sensed.shape[:-1], self.n_inputs))
+        inputs_nA = np.zeros((len(sensed), self.n_inputs))
         acting = None
         if first_step < self._settled:
-            at = np.arange(first_step, first_step + len(sensed)).reshape(-1, *[1] * (sensed.ndim - 1))
+            at = np.arange(first_step, first_step + len(sensed))[:, np.newaxis]
             acting = (self.first <= at) & ((self.end == 0) | (at < self.end))
         linear = self._lasting if acting is None else np.arange(self.n_linear)
         if linear.size:
@@ -204,7 +204,7 @@ class InputTable:
         return inputs_nA, on
 
     def _added(self, sensed: Array, rows: NDArray[np.intp]) -> Array:
-        """The sums of what rows sense, ``(n_steps, .., n_rows)``."""
+        """The sums of what rows sense, ``(n_steps, n_rows)``."""
         if self.place.shape[1] == 1:
             return sensed.take(self.place[rows, 0], axis=-1)
         return sensed[..., self.place[rows]].sum(axis=-1)

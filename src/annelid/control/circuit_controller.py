@@ -14,8 +14,8 @@ from annelid.control.base import SegmentController
 from annelid.control.circuit import Circuit, InputTable
 from annelid.control.senses import SENSED, lengthening_m
 from annelid.errors import ConfigError
-from annelid.nervous import GapJunction, Network, NetworkState, Stepper
-from annelid.protocols import Array, Plant, Sensation, State, Values
+from annelid.nervous import GapJunction, Network
+from annelid.protocols import Array, Plant, Sensation, Values
 
 
 class CircuitController(SegmentController):
@@ -114,55 +114,7 @@ class CircuitController(SegmentController):
         for step in range(n_steps):
             self.stepper.advance(self.network_state, inputs_nA[step])
             potentials[step] = self.network_state.potential[0]
-        return self._activation(potentials)
-
-    def step_copies(self, states: State, sensation: Sensation) -> tuple[State, Array]:
-        """Advances many copies by one control step, each as `step` does one, bit for bit; changes nothing here.
-
-        Args:
-            states: As `get_state` returns them, the arrays but for the number of steps with one more axis in
-                front, ``n_copies`` long.
-            sensation: Lengths with the same axis in front, ``(n_copies, n_segments, n_sensors)``; one time for all.
-
-        Returns:
-            The states one step on, and the activation, ``(n_copies, n_muscles)``.
-        """
-        now: dict[str, NDArray[Any]] = {name: states[name] for name in self._now if name not in ("potential", "gate")}
-        n_copies = len(states["potential"])
-        # Few widths of buffers serve any number of copies.
-        width = 1 << (n_copies - 1).bit_length()
-        if width not in self._copies:
-            stepper = Stepper(self.stepper.arrays, self.stepper.timestep_ms, self.circuit.scheme, width)
-            self._copies[width] = stepper, stepper.initial_state()
-        stepper, copies = self._copies[width]
-        copies.potential[:n_copies] = states["potential"][:, 0]
-        copies.gate[:n_copies] = states["gate"][:, 0]
-        of_all = np.zeros((width, self.table.n_inputs))
-        of_all[:n_copies] = self._inputs_nA(now, sensation, 1)[0]
-        stepper.advance(copies, of_all)
-        potential, gate = copies.potential[:n_copies].copy(), copies.gate[:n_copies].copy()
-        after: State = {"potential": potential[:, np.newaxis], "gate": gate[:, np.newaxis], **now}
-        return after, self._activation(potential)
-
-    def pieces_copies(self, states: State) -> NDArray[np.bool_]:
-        """Finds in which piece of its piecewise smooth equations each of many copies is.
-
-        Synapses open between two potentials, and a line of activation saturates: there the equations have kinks.
-
-        Args:
-            states: As for `step_copies`.
-
-        Returns:
-            Shape ``(n_copies, n_pieces)``; between two of its changes the equations are smooth.
-        """
-        potential = states["potential"][:, 0].astype(np.float64)
-        arrays = self.stepper.arrays
-        opening = (potential[:, arrays.terminal_neuron] - arrays.terminal_threshold_mV) * arrays.terminal_slope_per_mV
-        pieces = [opening > 0.0, opening > 1.0]
-        if self.circuit.readout.slope_per_mV is None:
-            activation = self._activation(potential)
-            pieces += [activation > 0.0, activation < 1.0]
-        return np.concatenate(pieces, axis=1)
+        return self.activation(potentials)
 
     def alarm(self) -> str | None:
         """Returns a sentence if a potential has left the range that currents and reversals can explain."""
@@ -175,10 +127,6 @@ class CircuitController(SegmentController):
             f"potential of {self.stepper.arrays.neurons[worst]} is {potential[worst]:.4g} mV, outside "
             f"{low:g} .. {high:g} mV, which currents reach: clock.control_timestep_s = {self.timestep_s:g} is too long"
         )
-
-    @cached_property
-    def _copies(self) -> dict[int, tuple[Stepper, NetworkState]]:
-        return {}
 
     @cached_property
     def _bounds_mV(self) -> tuple[float, float]:
@@ -202,7 +150,7 @@ class CircuitController(SegmentController):
         return min(levels) - drive, max(levels) + drive
 
     def _inputs_nA(self, now: dict[str, NDArray[Any]], sensation: Sensation, n_steps: int) -> Array:
-        """The inputs' currents at control steps, nA, ``(n_steps, .., n_inputs)``; takes the steps in ``now``."""
+        """The inputs' currents at control steps, nA, ``(n_steps, n_inputs)``; takes the steps in ``now``."""
         first = round(sensation.time_s / self.timestep_s)
         on = now["sensor_on"].astype(bool) if "sensor_on" in now else np.zeros(0, dtype=bool)
         inputs_nA, on = self.table.currents(self._sensed(sensation, n_steps), first, on)
@@ -216,7 +164,7 @@ class CircuitController(SegmentController):
         return inputs_nA
 
     def _sensed(self, sensation: Sensation, n_steps: int) -> Array:
-        """The list of all numbers that are sensed at each step, with a 0 behind, ``(n_steps, .., n_values + 1)``."""
+        """The list of all numbers that are sensed at each step, with a 0 behind, ``(n_steps, n_values + 1)``."""
         parts: list[Array] = []
         for name in self.circuit.senses:
             if name == "lengthening_m":
@@ -226,20 +174,19 @@ class CircuitController(SegmentController):
             if values.shape != SENSED[name].shape(self.n_segments):
                 raise ConfigError(f"the controller needs {name}, which the body does not sense")
             parts.append(np.tile(values.ravel(), (n_steps, 1)))
-        shape = parts[0].shape[:-1] if parts else (n_steps,)
-        return np.concatenate([*parts, np.zeros((*shape, 1))], axis=-1)
+        return np.concatenate([*parts, np.zeros((n_steps, 1))], axis=1)
 
     def _lengthening(self, sensation: Sensation, n_steps: int) -> Array:
-        """How much longer than at rest segments are at every control step, m, ``(n_steps, .., n_segments)``."""
+        """How much longer than at rest segments are at every control step, m, ``(n_steps, n_segments)``."""
         longer = lengthening_m(sensation.stretch_m, sensation.rest_stretch_m)
         if n_steps == 1:
             return longer[np.newaxis]
         rate = sensation.stretch_rate_m_per_s
-        times = self.timestep_s * np.arange(n_steps).reshape(-1, *[1] * longer.ndim)
+        times = self.timestep_s * np.arange(n_steps)[:, np.newaxis]
         return longer + times * (rate.mean(axis=-1) if rate.size else 0.0)
 
-    def _activation(self, potential: Array) -> Array:
-        """Activation of every muscle, ``(.., n_muscles)``, from potentials, ``(.., n_neurons)``."""
+    def activation(self, potential: Array) -> Array:
+        """Returns the activation of every muscle, ``(.., n_muscles)``, at potentials, mV, ``(.., n_neurons)``."""
         readout, value = self.circuit.readout, potential[..., self._up]
         if self._down.size:
             value = value - potential[..., self._down]

@@ -27,7 +27,7 @@ from annelid.textfiles import parse_toml, toml_text
 
 SOURCES: dict[str, type[Any]] = dict(zip(CIRCUIT_TABLES, (Sense, Switch, Pulse), strict=False))
 """What the tables of inputs that are set are called."""
-HOW = "annelid export-network PRESET --to toml writes one"
+HOW = "annelid export-network PRESET --to toml writes one, and in Python annelid.control.circuit_text"
 
 
 def circuit_text(circuit: Circuit) -> str:

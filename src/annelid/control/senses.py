@@ -22,7 +22,7 @@ class Sensed(NamedTuple):
 
 
 def lengthening_m(stretch_m: Array, rest_stretch_m: Array) -> Array:
-    """Returns by how much each segment's mean length exceeds that at rest, m, the same bits for one and many copies.
+    """Returns by how much each segment's mean length exceeds that at rest, m.
 
     Args:
         stretch_m: Lengths of every segment's springs, m, shape ``(.., n_segments, n_sensors)``.

@@ -34,14 +34,16 @@ if TYPE_CHECKING:
     from annelid.draw.page import html_page
     from annelid.draw.plots import figure7, plot_path
     from annelid.draw.render import DEFAULT_CAMERA, render_frame, render_video
-    from annelid.draw.scene import Skeleton, WormScene, postures_of, render_still
-    from annelid.draw.summary_table import UNKNOWN, aligned, comparison_table, fields_table, framed_table
+    from annelid.draw.scene import Skeleton, WormScene, postures_of
+    from annelid.draw.strands import POINTS_PER_SIDE, strand_curves
+    from annelid.draw.summary_table import UNKNOWN, aligned, comparison_table, fields_table
 
 __all__ = [
     "CONTRACTED",
     "CONTRACTED_WIDTH",
     "DEFAULT_CAMERA",
     "PIN_RGBA",
+    "POINTS_PER_SIDE",
     "RUN_FIGURES",
     "SPRING_RGBA",
     "STRAND_RGBA",
@@ -59,7 +61,6 @@ __all__ = [
     "figure7",
     "find_backend",
     "fitting_distance",
-    "framed_table",
     "html_page",
     "lengths_figure",
     "line_looks",
@@ -72,11 +73,11 @@ __all__ = [
     "postures_of",
     "progress_figure",
     "render_frame",
-    "render_still",
     "render_video",
     "save",
     "save_both",
     "segment_colors",
+    "strand_curves",
     "travel_figure",
     "uncertainty_figure",
 ]
@@ -84,6 +85,8 @@ __all__ = [
 __getattr__, __dir__ = lazy(
     __name__,
     {
+        "render_still": "render_frame draws a run on white",
+        "framed_table": "make a rich.table.Table",
         "Mark": "progress_figure takes the values of the trials",
         "load_frame_figure": "annelid_lab.calibration draws loops of a load frame",
         "Panel": "uncertainty_figure takes the rows of uncertainty.csv",

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from matplotlib.lines import Line2D
 
 WIDTH_IN = 7.2  # width of a figure across a page, inches
+MOST_ROWS = 6
+"""Segments that get a panel; of more some that are evenly spaced."""
 STYLE: Any = {
     "font.family": "sans-serif",
     "font.sans-serif": ["DejaVu Sans"],
@@ -42,14 +44,6 @@ STYLE: Any = {
     "figure.facecolor": "white",
 }
 
-# What differs on a dark page.
-_LIGHT = "#e8eaed"
-_DARK = {
-    **{f"{side}.facecolor": "#14161a" for side in ("figure", "axes", "savefig")},
-    **dict.fromkeys(("text.color", "axes.labelcolor", "xtick.color", "ytick.color", "axes.edgecolor"), _LIGHT),
-    "grid.color": "#33383f",
-}
-
 # Dark to light, so that the order of segments survives greyscale; hues far apart for colour-blind eyes.
 _FEW = ("#1b2a6b", "#c2410c", "#35b5a0", "#e3b428")
 RELAXED = (0.46, 0.49, 0.54)
@@ -69,11 +63,11 @@ def canvas(height_in: float, width_in: float = WIDTH_IN, *, dark: bool = False) 
         width_in: Width, inches.
         dark: Light words on a dark page.
     """
-    import matplotlib
+    from matplotlib import style
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    with matplotlib.rc_context(STYLE | (_DARK if dark else {})):
+    with style.context([STYLE, *(["dark_background", {"grid.color": "0.25"}] if dark else [])]):
         figure = Figure(figsize=(width_in, height_in), layout="constrained")
         FigureCanvasAgg(figure)
         yield figure
@@ -125,6 +119,11 @@ def segment_colors(n_segments: int) -> list[Any]:
 def line_looks(n_lines: int) -> list[dict[str, Any]]:
     """Returns colour and dashes of each of several lines, so that they differ in grey and for colour-blind readers."""
     return [{"color": c, "linestyle": d} for c, d in zip(segment_colors(n_lines), cycle(DASHES), strict=False)]
+
+
+def evenly(n: int, most: int) -> list[int]:
+    """Returns at most so many of n places from 0 on, the first and the last among them, evenly spaced."""
+    return np.unique(np.linspace(0, n - 1, min(n, most)).round().astype(int)).tolist()
 
 
 def activation_color(activation: float) -> tuple[float, float, float]:

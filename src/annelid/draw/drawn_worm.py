@@ -11,14 +11,13 @@ from numpy.typing import NDArray
 from annelid.arena.geoms import GROUND_RGBA, PLAIN_RGBA, add_looks
 from annelid.body import build_spec, robot_spec, worm_of
 from annelid.body.actuation import crossing_site, ring_names
-from annelid.body.constraint_rows import tied_bodies
 from annelid.body.formulations.rods.net import STRAND_RGBA
 from annelid.config import RunConfig
 from annelid.draw.camera import FIELD_OF_VIEW_DEG
 from annelid.draw.canvas import activation_color
 from annelid.draw.overlay import BRIGHT, DIM, Background, Entry, background_of
+from annelid.draw.strands import POINTS_PER_SIDE, StrandBodies, strand_curves, tube_faces, tubes
 from annelid.protocols import Array
-from annelid.simulation.scene_objects import in_scene
 
 HEADLIGHT = 0.25  # light from the camera; the lamp adds 0.4
 CONTRACTED_WIDTH = 1.8  # a contracted ring muscle is drawn this much thicker than a relaxed one
@@ -34,6 +33,9 @@ LOOKS = "annelid/"
 """What the names of sky, light and floor begin with in a robot's model, as none of its file does."""
 WAYPOINT_RGBA = (0.20, 0.55, 0.42, 0.35)
 WAYPOINT_HALF_HEIGHT_M = 1e-3
+HIDDEN = 5
+"""Group of what the engine is not to draw."""
+_CAPSULE = mujoco.mjtGeom.mjGEOM_CAPSULE.value
 
 
 class DrawnWorm:
@@ -50,24 +52,20 @@ class DrawnWorm:
         for tendon in spec.tendons:
             tendon.rgba = SPRING_RGBA
         _mark_waypoints(spec, config)
+        self._geometry = geometry = body.geometry()
+        self._tube_m, self._soft = body.strands.radius_m, not body.has_rigid_crossings
+        _add_tubes(spec, strand_curves(geometry.vertices_m, geometry)[0], self._tube_m)
         self.model = model = spec.compile()
+        self._strands = StrandBodies(model, geometry)
         self._has_waypoints = config.turning is not None and bool(config.turning.goals.points_m)
         # What is drawn of springs, cables and crossings must not hide the mesh of a small worm.
         radius_m = max(body.mesh.radii_m)
         model.tendon_width *= DRAWN_WIDTH * radius_m
-        self._balls = np.array([model.geom(crossing_site(i)).id for i in range(body.geometry().n_crossings)])
+        self._balls = np.array([model.geom(crossing_site(i)).id for i in range(geometry.n_crossings)])
         model.geom_rgba[self._balls] = self._behind.ball
         ball_m = model.geom_size[self._balls, 0]
         ball_m = np.minimum(ball_m, LARGEST_BALL * radius_m)
         model.geom_size[self._balls, 0] = np.maximum(ball_m, SMALLEST_BALL * body.strands.radius_m)
-        self._in_scene = in_scene(model)
-        connects = model.eq_objtype == mujoco.mjtObj.mjOBJ_BODY.value
-        connects &= model.eq_type == mujoco.mjtEq.mjEQ_CONNECT.value
-        tied = tied_bodies(model)
-        joined = np.stack([model.eq_obj1id[connects], model.eq_obj2id[connects]], axis=-1)
-        self._links = np.concatenate([joined, tied])
-        places = model.eq_data[connects, :6].reshape(-1, 2, 3)
-        self._link_places = np.concatenate([places, np.zeros((len(tied), 2, 3))])
         self.posture = mujoco.MjData(self.model)
         self.upright = upright(config)
         self._rings = [self.model.tendon(name).id for name in ring_names(body.n_segments, body.rings)]
@@ -78,23 +76,29 @@ class DrawnWorm:
         self.posture.qpos[:] = qpos
         for stage in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_camlight, mujoco.mj_flex, mujoco.mj_tendon):
             stage(self.model, self.posture)
-        if activation is None:
+        if activation is None or not self._rings:
             return
         for ring, width, value in zip(self._rings, self._widths, activation.tolist(), strict=True):
             self.model.tendon_rgba[ring] = (*activation_color(value), 1.0)
             self.model.tendon_width[ring] = width * (1.0 + (CONTRACTED_WIDTH - 1.0) * value)
 
-    def add_links(self, scene: mujoco.MjvScene) -> None:
-        """Adds a bar for each soft connection of a crossing, from one of its ends to the other."""
-        model, posture = self.model, self.posture
-        radius_m = LINK * float(model.geom_size[self._balls, 0].min(initial=math.inf))
-        capsule, rgba = mujoco.mjtGeom.mjGEOM_CAPSULE.value, np.array(self._behind.ball, dtype=np.float32)
-        turn = posture.xmat.reshape(-1, 3, 3)[self._links]
-        for ends in posture.xpos[self._links] + (turn @ self._link_places[..., None])[..., 0]:
+    def complete(self, scene: mujoco.MjvScene) -> None:
+        """Bends the tubes of the strands, and adds bars from the ball of each soft crossing to its strands."""
+        points, along = self._strands.curves(self.posture)
+        vertices, normals = tubes(points, along, self._tube_m)
+        # The skins of a scene's own bodies come first.
+        scene.skinvert[-vertices.size :], scene.skinnormal[-vertices.size :] = vertices.ravel(), normals.ravel()
+        if not self._soft:
+            return
+        geometry, pins = self._geometry, self.posture.geom_xpos[self._balls]
+        places = points[geometry.crossing_strands, POINTS_PER_SIDE * (geometry.crossing_plane[:, None] + 1)]
+        radius_m = LINK * float(self.model.geom_size[self._balls, 0].min())
+        rgba = np.array(self._behind.ball, dtype=np.float32)
+        for pin, place in zip(pins.repeat(2, axis=0), places.reshape(-1, 3), strict=True):
             if scene.ngeom < scene.maxgeom:
                 bar = scene.geoms[scene.ngeom]
-                mujoco.mjv_initGeom(bar, capsule, np.zeros(3), np.zeros(3), np.eye(3).ravel(), rgba)
-                mujoco.mjv_connector(bar, capsule, radius_m, *ends)
+                mujoco.mjv_initGeom(bar, _CAPSULE, np.zeros(3), np.zeros(3), np.eye(3).ravel(), rgba)
+                mujoco.mjv_connector(bar, _CAPSULE, radius_m, pin, place)
                 scene.ngeom += 1
 
     def legend(self) -> list[Entry]:
@@ -104,24 +108,15 @@ class DrawnWorm:
         entries: list[Entry] = [("strand", STRAND_RGBA[0], "line")]
         entries += [("axial spring", SPRING_RGBA, "line")] * springs
         entries += [(f"ring, {name}", activation_color(at), "line") for name, at in (("relaxed", 0), ("contracted", 1))]
-        soft = "soft crossing, bars: its opening" if self._links.size else "crossing"
+        soft = "soft crossing, bars: its opening" if self._soft else "crossing"
         entries.append((soft, self._behind.ball, "ball"))
         return [*entries, *([("waypoint", WAYPOINT_RGBA, "ball")] * self._has_waypoints)]
 
-    def part_ends(self, qpos: NDArray[np.floating]) -> Array:
-        """Both ends of every part of the worm in a posture, m, ``(point, 3)``.
-
-        The strands' free ends reach beyond the crossings, so these would not do.
-        """
-        model, posture = self.model, self.posture
-        parts = np.flatnonzero((model.geom_bodyid > 0) & ~self._in_scene[model.geom_bodyid])
-        capsules = model.geom_type[parts] == mujoco.mjtGeom.mjGEOM_CAPSULE.value
-        half_lengths = np.where(capsules, model.geom_size[parts, 1], 0.0)
-        posture.qpos[:] = qpos
-        mujoco.mj_kinematics(model, posture)
-        middles, axes = posture.geom_xpos[parts], posture.geom_xmat[parts].reshape(-1, 3, 3)[:, :, 2]
-        reach = half_lengths[:, None] * axes
-        return np.concatenate([middles - reach, middles + reach])
+    def outline(self, qpos: NDArray[np.floating]) -> Array:
+        """Points of all strands, whose free ends reach beyond the crossings, in a posture, m, ``(point, 3)``."""
+        self.posture.qpos[:] = qpos
+        mujoco.mj_kinematics(self.model, self.posture)
+        return self._strands.curves(self.posture)[0].reshape(-1, 3)
 
 
 class DrawnRobot(DrawnWorm):
@@ -150,22 +145,18 @@ class DrawnRobot(DrawnWorm):
             tendon.rgba = SPRING_RGBA if np.allclose(tendon.rgba, PLAIN_RGBA) else tendon.rgba
         self.model = model = spec.compile()
         self.posture = mujoco.MjData(model)
-        self._balls = np.zeros(0, dtype=np.int64)
-        self._links, self._link_places = np.zeros((0, 2), dtype=np.int64), np.zeros((0, 2, 3))
-        self._in_scene = model.body_weldid == 0
         pulled = [(model.actuator(name).trntype[0], model.actuator(name).trnid[0]) for name in robot.actuators]
         by_tendon = all(kind == mujoco.mjtTrn.mjTRN_TENDON.value for kind, _ in pulled)
         self._rings = [int(tendon) for _, tendon in pulled] if by_tendon else []
         self._widths = model.tendon_width[self._rings]
 
-    def pose(self, qpos: NDArray[np.floating], activation: NDArray[np.floating] | None = None) -> None:
-        """Brings all that is drawn into a posture, as `DrawnWorm.pose`; joints that contract have no colour."""
-        super().pose(qpos, activation if self._rings else None)
+    def complete(self, scene: mujoco.MjvScene) -> None:
+        """Adds nothing: a file describes all that is seen."""
 
-    def part_ends(self, qpos: NDArray[np.floating]) -> Array:
-        """Corners of boxes about all parts in a posture, m, ``(point, 3)``."""
+    def outline(self, qpos: NDArray[np.floating]) -> Array:
+        """Corners of boxes about all parts that move, in a posture, m, ``(point, 3)``."""
         model, posture = self.model, self.posture
-        parts = np.flatnonzero(~self._in_scene[model.geom_bodyid])
+        parts = np.flatnonzero(model.body_weldid[model.geom_bodyid] > 0)
         posture.qpos[:] = qpos
         mujoco.mj_kinematics(model, posture)
         reach = np.vstack([np.eye(3), -np.eye(3)])[:, None] * model.geom_rbound[parts][None, :, None]
@@ -219,6 +210,22 @@ def _light(spec: mujoco.MjSpec, behind: Background, material: str = "floor") -> 
         light.type = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
         light.diffuse = [0.4] * 3
         light.specular = [0.1] * 3
+
+
+def _add_tubes(spec: mujoco.MjSpec, curves_m: Array, radius_m: float) -> None:
+    """Adds tubes in place of the elements of strands: two skins, whose vertices `DrawnWorm.complete` places."""
+    for part in (*spec.flexes, *spec.geoms):
+        name = part.name if isinstance(part, mujoco.MjsFlex) else part.parent.name
+        if name.startswith("strand_"):
+            part.group = HIDDEN
+    half, n_points, _ = curves_m[::2].shape
+    faces = tube_faces(half, n_points)
+    for number, rgba in enumerate(STRAND_RGBA):
+        skin = spec.add_skin(name=f"strands_{number}", rgba=rgba)
+        n_vertices = int(faces.max()) + 1
+        skin.vert, skin.face = np.zeros(3 * n_vertices).tolist(), faces.ravel().tolist()
+        skin.bodyname, skin.bindpos, skin.bindquat = ["world"], [0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]
+        skin.vertid, skin.vertweight = [list(range(n_vertices))], [[1.0] * n_vertices]
 
 
 def _mark_waypoints(spec: mujoco.MjSpec, config: RunConfig) -> None:

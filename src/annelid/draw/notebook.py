@@ -58,7 +58,7 @@ def plot(run: Run | str | Path, path: str | Path | None = None, *, figure: str =
     Args:
         run: The run, or the path of its folder or file.
         path: File to write (``.png``, ``.pdf``, ``.svg``); by default ``FIGURE.png`` in the run's folder.
-        figure: ``figure7``, ``track`` (seen from above), ``network``, or one that another package adds.
+        figure: ``figure7``, ``track`` (seen from above), ``network`` (with its potentials), or one of another package.
 
     Returns:
         The picture, which a notebook shows; ``.path`` is its file.

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from contextlib import AbstractContextManager
-from itertools import chain
 from typing import Any
 
 import numpy as np
-from matplotlib.patches import Polygon
-from matplotlib.text import Text
+from matplotlib.collections import PolyCollection
 from numpy.typing import NDArray
 
 from annelid.draw.canvas import activation_color, canvas
@@ -54,13 +52,10 @@ class PlanarScene(AbstractContextManager):
             axes.set_ylim(low[1], high[1])
             self._title = axes.set_title(" ", animated=True)
             look: dict[str, Any] = {"ha": "center", "va": "center", "color": "w", "size": 13, "weight": "bold"}
-            self._segments: list[tuple[Polygon, Text]] = []
-            for i in range(self._corners.shape[1]):
-                patch = Polygon(
-                    np.zeros((4, 2)), closed=True, edgecolor="0.9" if dark else "0.15", linewidth=1.2, animated=True
-                )
-                axes.add_patch(patch)
-                self._segments.append((patch, axes.text(0, 0, str(i + 1), animated=True, **look)))
+            self._bodies = PolyCollection([], edgecolor="0.9" if dark else "0.15", linewidth=1.2, animated=True)
+            axes.add_collection(self._bodies)
+            numbers = range(1, self._corners.shape[1] + 1)
+            self._numbers = [axes.text(0, 0, str(number), animated=True, **look) for number in numbers]
             self._canvas.draw()
         # Axes and grid stay as they are, so each picture redraws the worm only: a tenth of the time.
         self._background = self._canvas.copy_from_bbox(figure.bbox)
@@ -71,12 +66,12 @@ class PlanarScene(AbstractContextManager):
     def picture(self, frame: int) -> NDArray[np.uint8]:
         """Draws one recorded sample, as pixels of shape ``(height, width, 3)``."""
         corners = self._corners[frame]
-        for i, (patch, label) in enumerate(self._segments):
-            patch.set_xy(corners[i])
-            patch.set_facecolor(activation_color(float(self._activation[frame, i])))
-            label.set_position(corners[i].mean(axis=0))
+        self._bodies.set_verts(list(corners))
+        self._bodies.set_facecolor([activation_color(share) for share in self._activation[frame].tolist()])
+        for number, middle in zip(self._numbers, corners.mean(axis=1).tolist(), strict=True):
+            number.set_position(middle)
         self._title.set_text(f"{self.times_s[frame]:.2f} s   (red: contracted, grey: relaxed)")
         self._canvas.restore_region(self._background)
-        for artist in (*chain(*zip(*self._segments, strict=True)), self._title):
+        for artist in (self._bodies, *self._numbers, self._title):
             self._axes.draw_artist(artist)
         return np.asarray(self._canvas.buffer_rgba())[:, :, :3].copy()

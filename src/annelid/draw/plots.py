@@ -10,7 +10,7 @@ import numpy as np
 from annelid.analysis.paper import changed_fields, published
 from annelid.analysis.rhythm import CONTRACTED, segment_activation, stretches
 from annelid.config.fidelity import RESOLUTION
-from annelid.draw.canvas import canvas, line_entries, line_looks, panel_title, plain, save
+from annelid.draw.canvas import canvas, evenly, line_entries, line_looks, panel_title, plain, save
 from annelid.draw.figures import RUN_FIGURES
 from annelid.errors import RunFileError
 from annelid.output import with_suffix
@@ -172,16 +172,7 @@ def _draw_levels(axes: Axes, levels: list[float], looks: list[dict]) -> None:
 
 
 def _name_level(axes: Axes, level: float, text: str) -> None:
-    axes.annotate(
-        text,
-        (1.0, level),
-        xycoords=("axes fraction", "data"),
-        xytext=(3, 0),
-        textcoords="offset points",
-        va="center",
-        fontsize=7.0,
-        color="0.25",
-    )
+    axes.text(1.004, level, text, transform=axes.get_yaxis_transform(), va="center", fontsize=7.0, color="0.25")
 
 
 def _published_levels(run: Run) -> list[float]:
@@ -202,9 +193,7 @@ def _published_levels(run: Run) -> list[float]:
 
 def _name_segments(figure: Figure, looks: list[dict], title: str) -> None:
     """Puts a title and a legend of the segments above all panels: every one, or evenly spaced ones of many."""
-    n = len(looks)
-    named = np.unique(np.linspace(0, n - 1, min(n, _MOST_NAMED)).round().astype(int)).tolist()
-    entries = [(*looks[i].values(), _THICK, f"segment {i + 1}") for i in named]
+    entries = [(*looks[i].values(), _THICK, f"segment {i + 1}") for i in evenly(len(looks), _MOST_NAMED)]
     figure.legend(
         handles=line_entries(entries),
         loc="outside upper left",

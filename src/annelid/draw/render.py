@@ -31,7 +31,7 @@ MOST_PICTURES = 200_000  # of a video, which are drawn some 30 a second
 FPS_RANGE = (1.0, 240.0)
 _H264: dict[str, Any] = {"codec": "libx264", "quality": 7}
 # 256 colours chosen from the whole video: the format's own palette would leave the strands in bands.
-_PALETTE = "split[all][drawn];[all]palettegen=stats_mode=diff[colors];[drawn][colors]paletteuse=dither=bayer"
+_PALETTE = "split[all][drawn];[all]palettegen[colors];[drawn][colors]paletteuse=dither=none"
 _GIF: dict[str, Any] = {
     "codec": "gif",
     "pix_fmt_out": "pal8",
@@ -92,7 +92,7 @@ def render_video(
     size: tuple[int, int] | None = None,
     progress: Progress | None = None,
 ) -> Path:
-    """Draws the whole run as a video (H.264, or an animated GIF); its edges are less smooth than those of a frame.
+    """Draws the whole run as a video: H.264, whose edges are less smooth than those of a frame, or an animated GIF.
 
     The file appears under its name only when it is complete.
 
@@ -125,7 +125,8 @@ def render_video(
         width, height = run.config.body.video_size
         # A GIF is large for what it shows, and so it is drawn smaller.
         size = (width // 2, height // 2) if path.suffix.lower() == ".gif" else (width, height)
-    with _scene(run, size, camera, background, fine=False) as scene, whole_file(path) as draft:
+    fine = path.suffix.lower() == ".gif"
+    with _scene(run, size, camera, background, fine=fine) as scene, whole_file(path) as draft:
         first, last = float(scene.times_s[0]), float(scene.times_s[-1])
         pictures = (last - first) * fps / speed + 1.0
         if pictures > MOST_PICTURES:

@@ -1,23 +1,22 @@
-"""A 3D worm drawn by MuJoCo: as a run recorded it, in postures that are given one by one, or once on white."""
+"""A 3D worm drawn by MuJoCo: as a run recorded it, or in postures that are given one by one."""
 
 from __future__ import annotations
 
 import math
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from annelid.config import RunConfig
-from annelid.draw.camera import FIELD_OF_VIEW_DEG, FIXED, fitting_distance, picture_points, view_angles
-from annelid.draw.canvas import CONTRACTED
+from annelid.draw.camera import FIELD_OF_VIEW_DEG, FIXED, fitting_distance, view_angles
 from annelid.draw.drawn_worm import DrawnRobot, DrawnWorm, dim, set_fog
 from annelid.draw.gl import find_backend
-from annelid.draw.overlay import BRIGHT, Overlay, background_of
+from annelid.draw.overlay import Overlay, background_of
+from annelid.draw.strands import StrandBodies
 from annelid.errors import RenderingUnavailable, RunFileError
 from annelid.protocols import Array
 from annelid.simulation.anatomy import Anatomy
@@ -25,7 +24,6 @@ from annelid.simulation.runfile import Run
 
 ROOM = 1.3
 """A camera that cannot know what is to come keeps this many times the distance from which the worm at rest fits."""
-PALE = 3.0  # on white, what lies this many half worms behind its middle would vanish
 
 
 class _Scene(AbstractContextManager):
@@ -96,7 +94,7 @@ class _Scene(AbstractContextManager):
         self._context.make_current()
         parts = mujoco.mjtCatBit.mjCAT_ALL.value
         mujoco.mjv_updateScene(worm.model, worm.posture, self._option, None, camera, parts, scene)
-        worm.add_links(scene)
+        worm.complete(scene)
         for eye in scene.camera:
             eye.pos = camera.lookat + (eye.pos - camera.lookat) @ worm.upright
             eye.forward, eye.up = eye.forward @ worm.upright, eye.up @ worm.upright
@@ -131,7 +129,7 @@ class WormScene(_Scene):
         self.times_s: Array = run.data["frame_time"].values
         self._qpos = postures_of(run, worm.model.nq)
         self._activation = run.data["activation"]
-        points = np.stack([worm.part_ends(qpos) for qpos in self._qpos])
+        points = np.stack([worm.outline(qpos) for qpos in self._qpos])
         box_middle = (points.min(axis=(0, 1)) + points.max(axis=(0, 1))) / 2
         seen = run.data["crossing_position"].values if "crossing_position" in run.data else points
         self._target = seen.mean(axis=1)
@@ -162,7 +160,7 @@ class PostureScene(_Scene):
     def __init__(self, config: RunConfig, width: int, height: int, camera: str) -> None:
         angles = view_angles(camera)
         worm = DrawnWorm(config)
-        points = worm.part_ends(worm.model.qpos0)
+        points = worm.outline(worm.model.qpos0)
         offsets = (points - _middle(points)) @ worm.upright.T
         distance = ROOM * fitting_distance(offsets, *angles, width / height)
         dim(worm.model, angles[1])
@@ -170,66 +168,7 @@ class PostureScene(_Scene):
 
     def picture(self, qpos: Array, activation: Array, caption: str) -> NDArray[np.uint8]:
         """Draws a posture, with activation ``(n_muscles,)``, as pixels of shape ``(height, width, 3)``."""
-        return self._draw(qpos, activation, _middle(self._worm.part_ends(qpos)), caption)
-
-
-@dataclass(frozen=True)
-class Still:
-    """A rendered posture that marks can be drawn on."""
-
-    pixels: NDArray[np.uint8]  # (height, width, 3)
-    target_m: Array  # point that the camera looks at, (3,)
-    angles_deg: tuple[float, float]  # azimuth and elevation of the line of sight
-    distance_m: float  # from the camera to the point that it looks at
-    upright: Array  # the rotation from the model's axes to upright ones, (3, 3)
-
-    def places(self, points_m: ArrayLike) -> Array:
-        """Finds the pixels at which points, m, ``(..., 3)``, appear.
-
-        Returns:
-            Columns and rows, counted from the picture's upper left corner, shape ``(..., 2)``.
-        """
-        height, width = self.pixels.shape[:2]
-        offsets = (np.asarray(points_m, dtype=float) - self.target_m) @ self.upright.T
-        shares = picture_points(offsets, *self.angles_deg, self.distance_m, width / height)
-        return shares * [width, height] - 0.5
-
-
-def render_still(
-    config: RunConfig,
-    angles_deg: tuple[float, float],
-    size: tuple[int, int],
-    *,
-    qpos: Array | None = None,
-    activation: Array | None = None,
-) -> Still:
-    """Renders one posture on white, without a floor; what lies behind is paler.
-
-    Args:
-        config: Configuration of the 3D worm.
-        angles_deg: Azimuth and elevation of the line of sight.
-        size: Width and height, pixels.
-        qpos: The posture as a run records it; by default at rest.
-        activation: Colours and widths of the ring muscles; by default all rings and springs are red.
-
-    Raises:
-        RenderingUnavailable: No OpenGL back-end works.
-    """
-    worm = DrawnWorm(config)
-    model = worm.model
-    if activation is None:
-        model.tendon_rgba[:] = (*CONTRACTED, 1.0)
-    model.geom_rgba[model.geom_bodyid == 0, 3] = 0.0
-    model.vis.headlight.ambient[:] = BRIGHT
-    model.vis.rgba.fog[:] = 1.0
-    drawn = model.qpos0 if qpos is None else qpos
-    points = worm.part_ends(drawn)
-    target = _middle(points)
-    distance = fitting_distance((points - target) @ worm.upright.T, *angles_deg, size[0] / size[1])
-    reach = float(np.linalg.norm(points - target, axis=1).max())
-    set_fog(model, distance - reach, distance + PALE * reach)
-    with _Scene(worm, size, angles_deg, distance, fine=True, words=False) as scene:
-        return Still(scene._draw(drawn, activation, target), target, angles_deg, distance, worm.upright)
+        return self._draw(qpos, activation, _middle(self._worm.outline(qpos)), caption)
 
 
 def postures_of(run: Run, n_coordinates: int) -> NDArray[np.floating]:
@@ -259,20 +198,13 @@ class Skeleton:
     def __init__(self, anatomy: Anatomy) -> None:
         self.anatomy = anatomy
         self._data = mujoco.MjData(anatomy.model)
-        mujoco.mj_kinematics(anatomy.model, self._data)
-        vertices = anatomy.geometry.vertices_m
-        self._shape = vertices.shape
-        self._body = _bodies_of_vertices(anatomy.model, *vertices.shape[:2])
-        # At rest the axes of all bodies are the world's.
-        self._place = vertices.reshape(-1, 3) - self._data.xpos[self._body]
+        self._strands = StrandBodies(anatomy.model, anatomy.geometry)
 
     def locate(self, qpos: NDArray[np.floating]) -> tuple[Array, Array]:
-        """Returns vertices of the strands from front to rear, m, ``(n_strands, n_vertices, 3)``, and the crossings."""
+        """Returns the curves of the strands, m, as `strand_curves`, and the crossings, ``(n_crossings, 3)``."""
         self._data.qpos[:] = qpos
         crossing, *_ = self.anatomy.locate(self._data)
-        turn = self._data.xmat[self._body].reshape(-1, 3, 3)
-        vertices = self._data.xpos[self._body] + np.einsum("vij,vj->vi", turn, self._place)
-        return vertices.reshape(self._shape), crossing
+        return self._strands.curves(self._data)[0], crossing
 
     def places(self, geoms: NDArray[np.int64]) -> tuple[Array, Array]:
         """Returns centres, m, ``(n, 3)``, and quaternions, ``(n, 4)``, of n geoms in the posture located last."""
@@ -280,19 +212,6 @@ class Skeleton:
         for turn, axes in zip(turns, self._data.geom_xmat[geoms], strict=True):
             mujoco.mju_mat2Quat(turn, axes)
         return self._data.geom_xpos[geoms], turns
-
-
-def _bodies_of_vertices(model: mujoco.MjModel, n_strands: int, n_vertices: int) -> NDArray[np.int64]:
-    """Body that carries each vertex, strand by strand: its own for rods, the element behind it for a chain."""
-    if model.nflex:
-        of_strand = []
-        for strand in range(n_strands):
-            flex = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_FLEX, f"strand_{strand}")
-            first, count = model.flex_vertadr[flex], model.flex_vertnum[flex]
-            of_strand.append(model.flex_vertbodyid[first : first + count])
-        return np.concatenate(of_strand).astype(np.int64)
-    elements = np.minimum(np.arange(n_vertices), n_vertices - 2)
-    return np.array([model.body(f"strand_{strand}_{e}").id for strand in range(n_strands) for e in elements])
 
 
 def _middle(points_m: Array) -> Array:

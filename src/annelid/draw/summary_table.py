@@ -7,9 +7,6 @@ from itertools import pairwise
 from math import ceil
 from typing import TYPE_CHECKING, NamedTuple
 
-from rich import box
-from rich.table import Table
-
 from annelid.analysis.comparison import LACKING, Comparison, relative_difference
 from annelid.analysis.numbers import UNKNOWN, Value, three_digits
 from annelid.analysis.paper import (
@@ -76,31 +73,6 @@ class Row(NamedTuple):
     ours: str
     reference: str = ""
     deviation: str = ""
-
-
-def framed_table(*headings: str, title: str | None = None, caption: str | None = None, min_width: int = 0) -> Table:
-    """Returns an empty table in the project's look, whose long words go on in the next line.
-
-    Args:
-        headings: Of its columns.
-        title: Above it, bold.
-        caption: Below it.
-        min_width: Least width, characters.
-    """
-    table = Table(
-        *headings,
-        title=title,
-        title_justify="left",
-        title_style="bold",
-        caption=caption,
-        caption_justify="left",
-        box=box.SIMPLE_HEAD,
-        pad_edge=False,
-        min_width=min_width,
-    )
-    for column in table.columns:
-        column.overflow = "fold"
-    return table
 
 
 def aligned(rows: Sequence[Sequence[str]]) -> str:
@@ -173,12 +145,14 @@ def explained(row: str) -> list[tuple[str, str, str]]:
 def _rows(numbers: Summary, config: RunConfig, controller: str | None, *, everything: bool) -> dict[str, Row]:
     """Rows by the name of their number; those without any number are left out."""
     beside = references(config, controller)
+    ended_early = "" if numbers.status == "complete" else numbers.status.replace("_", " ")
+    doubts = ended_early, f"{len(numbers.warnings)}, below" if numbers.warnings else ""
     cells = {
         "order": ("order", _order(numbers)),
         "onsets (s)": ("onsets (s)", _onsets(numbers)),
         **{name: (one.heading, one.text(getattr(numbers, name))) for name, one in NUMBERS.items() if one.label},
         "work goes to (%)": ("work goes to (%)", _shares_of_the_work(numbers)),
-        "warnings": ("warnings", f"{len(numbers.warnings)}, below" if numbers.warnings else "none"),
+        "warnings": ("warnings", ", ".join(filter(None, doubts)) or "none"),
     }
     if numbers.speed_m_per_s is None and numbers.travel_m is not None:
         cells["speed_m_per_s"] = (NUMBERS["speed_m_per_s"].heading, _why_no_speed(numbers))

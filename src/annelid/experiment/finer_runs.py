@@ -85,7 +85,9 @@ def run_with_variants(
     if overwrite or not (folder / runs).is_dir():
         refuse_used_folder(folder, overwrite)
     elif (folder / FILE_NAME).exists() and read_config(folder) != config:
-        raise ConfigError(f"the output folder {folder} has another run in it: name another, or allow overwriting")
+        raise ConfigError(
+            f"the output folder {folder} has another run in it: name another, or use --force (overwrite=True)"
+        )
     cases = [Case(config.name, changed, config) for changed in ({}, *variants)]
     with workers(executor, jobs) as given:
         store = Store(folder / runs, given, progress=progress)

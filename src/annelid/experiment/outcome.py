@@ -87,8 +87,8 @@ def read_outcome(path: Path) -> Outcome:
 
 
 def _holds(run: Run) -> tuple[Hold, ...]:
-    contractions, data = run.config.controller.scheduled, run.data
-    if not contractions or not data.sizes.get("time"):
+    contractions, data = run.config.controller.scheduled, run.variables
+    if not contractions or not data["time"].values.size:
         return ()
     times = data["time"].values
     shape = len(times), run.config.body.n_segments, -1

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from annelid.errors import ConfigError, RunFileError
 from annelid.experiment.outcome import OUTCOME_NAME
-from annelid.simulation.runfile import FILE_NAME, STATUSES, read_config
+from annelid.simulation.runfile import FILE_NAME, STATUSES, open_checked, read_config
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,19 +42,17 @@ def runs_below(root: Path) -> Iterator[Kept]:
 
 
 def _kept(folder: Path, files: list[str]) -> Kept:
-    import xarray
-
     preset = duration_s = None
     status = "outcome only"
     if FILE_NAME in files:
         try:
             preset = read_config(folder).name
             # Not `open_run`, which would load all of a large file.
-            with xarray.open_dataset(folder / FILE_NAME, engine="h5netcdf") as data:
-                n_samples = int(data["samples_written"])
+            with open_checked(folder / FILE_NAME) as data:
+                n_samples = int(data["samples_written"][()])
                 duration_s = float(data["time"][n_samples - 1]) if n_samples else 0.0
-                status = STATUSES[int(data["status_code"])]
-        except (RunFileError, OSError, KeyError, IndexError, ValueError):
+                status = STATUSES[int(data["status_code"][()])]
+        except RunFileError:
             status = "unreadable"
     states = [(folder / file).lstat() for file in files]
     changed = datetime.fromtimestamp(max(state.st_mtime for state in states), UTC).isoformat(timespec="seconds")

@@ -388,8 +388,7 @@ def _drawn(data: xr.Dataset, names: Sequence[str]) -> xr.Dataset:
     chosen = data[[*names, "status"]]
     for name in names:
         if SEGMENT in chosen[name].dims:
-            text = f"{chosen[name].attrs['long_name']}, mean of segments"
-            chosen[name] = chosen[name].mean(SEGMENT).assign_attrs(chosen[name].attrs | {"long_name": text})
+            chosen[name] = chosen[name].mean(SEGMENT, keep_attrs=True).assign_attrs(of=", mean of segments")
     return chosen
 
 

@@ -20,7 +20,6 @@ from annelid.analysis import NUMBERS
 from annelid.analysis.numbers import UNKNOWN, Number
 from annelid.config import RunConfig
 from annelid.draw.figures.experiments import uncertainty_figure
-from annelid.draw.summary_table import framed_table
 from annelid.errors import ConfigError
 from annelid.experiment.finer_runs import STEP, finer_steps, more_elements, run_with_variants
 from annelid.experiment.outcome import Outcome
@@ -269,11 +268,11 @@ def quantity_of(name: str, value: float | None, others: Mapping[str, Sequence[fl
 def uncertainty_table(result: Uncertainty) -> Table:
     """Lays out values and errors as a table for the terminal; quantities that no run has are left out."""
     title = f"{result.config.name}: error bars, {result.samples}"
-    table = framed_table(title=title, caption="\n".join(_remarks(result)))
+    table = Table(title=title, caption="\n".join(_remarks(result)), box=None, pad_edge=False)
     table.add_column("quantity", no_wrap=True)
-    table.add_column("value", min_width=18, overflow="fold")
+    table.add_column("value")
     for heading in ("parameters", "time step", "elements"):
-        table.add_column(heading, justify="right", no_wrap=True, min_width=len(heading))
+        table.add_column(heading, justify="right", no_wrap=True)
     for quantity in result.quantities:
         if quantity.value is not None or quantity.n_samples:
             errors = map(quantity.error_text, quantity.errors.values())

@@ -6,7 +6,7 @@ import json
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -87,7 +87,7 @@ def selected(run: Run, selection: Selection) -> Run:
         raise RunFileError(f"{run.path} has no sample {asked}: it goes from {times[0]:g} to {times[-1]:g} s")
     if selection.signals is not None:
         data = data[[*dict.fromkeys(selection.signals), "frame_time"]]
-    return replace(run, data=data)
+    return run.with_data(data)
 
 
 def signal_names(data: xr.Dataset) -> list[str]:

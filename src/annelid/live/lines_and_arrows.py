@@ -35,7 +35,7 @@ LONGEST_ARROW = 4.0  # of the arrows of contact forces, in radii of the worm at 
 class Picture:
     """One instant, ready to draw, in the model's axes."""
 
-    strands: Lines  # elements of all strands; their colours never change
+    strands: Lines  # pieces of the curves of all strands; their colours never change
     rings: Lines  # ring muscles from crossing to crossing
     ring_colors: Colors  # grey at rest, red where activated
     springs: Lines
@@ -71,19 +71,19 @@ class Painter:
         self.arrow_N = float(f"{2.0 * share:.1g}") if share > 0 else 1.0
 
     def strand_colors(self) -> Colors:
-        """Colours of all elements, one for either handedness."""
-        n_strands, n_vertices, _ = self._geometry.vertices_m.shape
-        handed = np.arange(n_strands) // self._geometry.n_per_plane
+        """Colours of all pieces, one for either handedness."""
+        strands, _ = self._skeleton.locate(self.model.qpos0)
+        handed = np.arange(len(strands)) // self._geometry.n_per_plane
         colors = np.asarray(STRAND_COLORS)[handed]
-        return _bytes(np.repeat(colors, 2 * (n_vertices - 1), axis=0)).reshape(-1, 2, 3)
+        return _bytes(np.repeat(colors, 2 * (strands.shape[1] - 1), axis=0)).reshape(-1, 2, 3)
 
     def paint(self, moment: Moment) -> Picture:
         """Draws one moment."""
-        vertices, crossing = self._skeleton.locate(moment.qpos)
+        curves, crossing = self._skeleton.locate(moment.qpos)
         springs = crossing[self._geometry.springs]
         length = np.linalg.norm(springs[:, 1] - springs[:, 0], axis=-1)
         return Picture(
-            strands=self._lines(np.stack([vertices[:, :-1], vertices[:, 1:]], axis=2).reshape(-1, 2, 3)),
+            strands=self._lines(np.stack([curves[:, :-1], curves[:, 1:]], axis=2).reshape(-1, 2, 3)),
             rings=self._lines(crossing[self._ring_pairs]),
             ring_colors=ring_colors(moment.activation, self._corners),
             springs=self._lines(springs),

@@ -19,7 +19,8 @@ BELOW, AT_REST, ABOVE = (0.48, 0.62, 0.95), (1.0, 1.0, 1.0), (0.96, 0.58, 0.25)
 def network_html(network: Network) -> str:
     """Returns the drawing of a network and what its colours and labels mean."""
     colors = f"blue {FULL_MV:g} mV below rest, white at rest, orange {FULL_MV:g} mV above"
-    key = escape(printable("; ".join([colors, *meanings_of(network)])))
+    meanings = (f"{label}: {role}" for label, role in meanings_of(network).items())
+    key = escape(printable("; ".join([colors, *meanings])))
     drawing = network_svg(network)
     return f'<div class="annelid-network">{drawing}<p style="font-size:0.8em;margin:0.3em 0.6em">{key}</p></div>'
 

@@ -45,17 +45,17 @@ class RobotPainter:
         self._corners = max(map(len, self._lines))
         self._n_segments = config.body.n_segments
         self._moving = np.flatnonzero(model.body_weldid > 0)
-        self.radius_m = float(np.ptp(self._drawn.part_ends(first.qpos), axis=0).max()) / 10
+        self.radius_m = float(np.ptp(self._drawn.outline(first.qpos), axis=0).max()) / 10
         weight_N = float(model.body_mass[self._moving].sum() * np.linalg.norm(model.opt.gravity))
         self.arrow_N = float(f"{2.0 * weight_N / self._n_segments:.1g}") if weight_N > 0 else 1.0
 
     def strand_colors(self) -> Colors:
         """Colours of what is not seen: lines without length, to which the camera is fitted."""
-        return np.zeros((len(self._drawn.part_ends(self.model.qpos0)), 2, 3), dtype=np.uint8)
+        return np.zeros((len(self._drawn.outline(self.model.qpos0)), 2, 3), dtype=np.uint8)
 
     def paint(self, moment: Moment) -> Picture:
         """Draws one moment."""
-        points = self._drawn.part_ends(moment.qpos).astype(np.float32)
+        points = self._drawn.outline(moment.qpos).astype(np.float32)
         rings = np.array([self._filled(ends) for ends in self._lines])
         middles = rings.mean(axis=(1, 2)).reshape(self._n_segments, -1, 3).mean(axis=1)
         arrows = np.stack([middles, middles + self.radius_m * moment.contact_force_N / self.arrow_N], axis=1)

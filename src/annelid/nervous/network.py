@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import NoReturn, Self
+from typing import Self
 
 import numpy as np
 
-from annelid.errors import ConfigError
 from annelid.nervous.arrays import NetworkArrays, build_arrays
 from annelid.nervous.stepper import Scheme, Stepper
 from annelid.nervous.toml import read_network, write_network
@@ -62,16 +61,6 @@ class Network(Wiring):
         total = arrays.weights[:, : len(arrays.neurons)].sum(axis=0)
         total += np.abs(arrays.weights[arrays.drive["rectified"], len(arrays.neurons) :]).sum(axis=0)
         return float(np.min(2.0 * arrays.capacitance_nF / np.maximum(total, np.finfo(float).tiny)))
-
-    def diagram(self, **_: object) -> NoReturn:
-        """Names the function that draws a network; this method has gone.
-
-        Raises:
-            ConfigError: Always.
-        """
-        raise ConfigError(
-            "Network.diagram has been removed: annelid.draw.network_figure(network, 'network.svg') draws it"
-        )
 
     def to_toml(self) -> str:
         """Returns the network as TOML text, from which `from_toml` makes the same network to the last bit."""

@@ -38,9 +38,7 @@ def adjusted(running: Simulation, before: RunConfig, after: RunConfig) -> Simula
             if differ("clock") and isinstance(plant, WormPlant):
                 # Its state of one step ago is that of a step of another length.
                 plant.mechanics.rest()
-    if any(
-        getattr(before, part) != getattr(after, part) for part in ("controller", "turning", "sensor", "clock", "trial")
-    ):
+    if differ("controller", "turning", "sensor", "clock", "trial"):
         controller = _taking_over(build_controller(after, plant), controller, "controller")
     simulation = Simulation(after, plant, controller, running.sensation, running.noise, running.step)
     simulation.activation = running.activation

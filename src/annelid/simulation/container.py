@@ -26,6 +26,8 @@ from annelid.simulation import digest
 
 Extent = tuple[int, int]
 """Where a variable lies in the file: its offset and its length, bytes."""
+WITHOUT_LABELS = "This is a netCDF dimension but not a netCDF variable."
+"""How netCDF-4 calls a dimension without labels, before its size."""
 _METADATA_BYTES = 262_144
 
 
@@ -105,7 +107,6 @@ def _reason(error: BaseException) -> str:
 def _lay_out(
     path: Path, sizes: Mapping[str, int], variables: Sequence[Variable], attrs: Mapping[str, Any]
 ) -> dict[str, Extent]:
-    import h5netcdf
     import h5py
 
     allocated_at_once = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
@@ -114,10 +115,11 @@ def _lay_out(
     allocated_at_once.set_fill_time(h5py.h5d.FILL_TIME_ALLOC)
     # Offsets at multiples of 8 keep every number within one memory page, hence whole after a kill.
     alignment: dict[str, Any] = {"alignment_threshold": 0, "alignment_interval": 8}
-    with h5netcdf.File(path, "w", libver="earliest", **alignment) as file:
-        file.dimensions = dict(sizes)
+    with h5py.File(path, "w", libver="earliest", **alignment) as file:
         file.attrs.update(attrs)
+        made: dict[str, Any] = {}
         for variable in variables:
+            attributes = {"units": variable.units, "long_name": variable.long_name, **variable.attrs}
             options: dict[str, Any] = {"dtype": variable.dtype}
             if variable.dtype == "str":
                 options = {"dtype": h5py.string_dtype(), "data": np.array(variable.data, dtype=object)}
@@ -129,9 +131,19 @@ def _lay_out(
             else:
                 options["dcpl"] = allocated_at_once.copy()
                 if np.dtype(variable.dtype).kind == "f":
-                    options["fillvalue"] = np.nan
-            created = file.create_variable(variable.name, variable.dims, **options)
-            created.attrs.update({"units": variable.units, "long_name": variable.long_name, **variable.attrs})
+                    options["fillvalue"] = attributes["_FillValue"] = np.nan
+            shape = [sizes[dim] for dim in variable.dims]
+            made[variable.name] = file.create_dataset(variable.name, shape, **options)
+            made[variable.name].attrs.update(attributes)
+        for dim, size in sizes.items():
+            if dim in made:
+                made[dim].make_scale(dim)
+            else:
+                made[dim] = file.create_dataset(dim, (size,), ">f4")
+                made[dim].make_scale(f"{WITHOUT_LABELS} {size:10d}")
+        for variable in variables:
+            for axis, dim in enumerate(variable.dims if variable.name not in sizes else ()):
+                made[variable.name].dims[axis].attach_scale(made[dim])
     with h5py.File(path, "r") as file:
         stored = {variable.name: file[variable.name].id for variable in variables}
         return {name: (dataset.get_offset(), dataset.get_storage_size()) for name, dataset in stored.items()}

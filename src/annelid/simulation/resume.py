@@ -9,7 +9,7 @@ from typing import Any
 from annelid.config import RunConfig, field_value, fields_of
 from annelid.errors import ConfigError, RunFileError
 from annelid.simulation.checkpoint import Checkpoint
-from annelid.simulation.runfile import ACTED, Run, config_in, examined_file, present_data, read_checkpoint
+from annelid.simulation.runfile import ACTED, Run, config_in, read_attributes, read_checkpoint
 
 _FREE = frozenset({"duration_s", "record", "name", "summary", "published"})
 """Fields in which a continued run may differ from the one before it."""
@@ -35,12 +35,10 @@ class Origin:
 
 def origin_of(run: Run | str | Path) -> Origin:
     """Reads what is needed to continue a run; raises as `read_checkpoint`, and where a gone field acted in it."""
-    path = examined_file(run.path if isinstance(run, Run) else run)[0]
-    with present_data(path) as data:
-        if acted := data.attrs.get(ACTED):
-            raise RunFileError(f"{path} cannot be continued: {acted} acted in it, which is gone; run it anew")
-        config = config_in(path, data.attrs)
-    return Origin(path, config, read_checkpoint(path))
+    path, attrs = read_attributes(run.path if isinstance(run, Run) else run)
+    if acted := attrs.get(ACTED):
+        raise RunFileError(f"{path} cannot be continued: {acted} acted in it, which is gone; run it anew")
+    return Origin(path, config_in(path, attrs), read_checkpoint(path))
 
 
 def continued_config(config: RunConfig | None, origin: Origin, out: Path) -> RunConfig:

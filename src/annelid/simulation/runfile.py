@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
-from functools import reduce
+from dataclasses import dataclass, replace
+from functools import cached_property, reduce
 from operator import getitem
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from annelid.config import RunConfig
@@ -21,6 +22,7 @@ from annelid.errors import ConfigError, RunFileError, UnreadableText
 from annelid.registry import Registry
 from annelid.simulation import digest
 from annelid.simulation.checkpoint import Checkpoint, newest_payload
+from annelid.simulation.container import WITHOUT_LABELS
 from annelid.simulation.lock import LOCK_NAME
 from annelid.textfiles import parse_json
 
@@ -46,6 +48,16 @@ STATUSES = ("running_or_killed", "complete", "interrupted", "stopped_by_guard", 
 
 CPU_TIME = "cpu_time"
 _BOOKKEEPING = ("samples_written", "frames_written", "status_code", "status_message")
+_OF_THE_FORMAT = {"CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST", "_FillValue", "coordinates"}
+"""Attributes by which netCDF-4 and CF tie variables together; so do those whose names begin with ``_N``."""
+
+
+class Recorded(NamedTuple):
+    """One variable of a run, as xarray takes them: the names of its dimensions, its values and its attributes."""
+
+    dims: tuple[str, ...]
+    values: NDArray[Any]
+    attrs: Mapping[str, Any]
 
 
 @dataclass(frozen=True, repr=False)
@@ -54,7 +66,8 @@ class Run:
 
     Attributes:
         path: The run file.
-        data: Its variables, loaded, cut to the samples and frames that were written.
+        variables: All that was recorded, by name, cut to the samples and frames that were written.
+        attrs: The file's global attributes.
         config: The configuration it was made with.
         status: How it ended, one of `STATUSES`.
         message: Why it ended before its time; empty if it did not.
@@ -63,15 +76,29 @@ class Run:
     """
 
     path: Path
-    data: xarray.Dataset
+    variables: Mapping[str, Recorded]
+    attrs: Mapping[str, Any]
     config: RunConfig
     status: str
     message: str
     warnings: tuple[str, ...] = ()
     cpu_time_s: float = 0.0
 
+    @cached_property
+    def data(self) -> xarray.Dataset:
+        """All that was recorded, as xarray has it; it shares its memory with `variables`."""
+        import xarray
+
+        return xarray.Dataset(self.variables, attrs=self.attrs).set_coords({"frame_time"} & {*self.variables})
+
+    def with_data(self, data: xarray.Dataset) -> Run:
+        """Returns the run with other data, such as some samples of its own."""
+        parts: Any = data.variables
+        variables = {name: Recorded(one.dims, one.values, one.attrs) for name, one in parts.items()}
+        return replace(self, variables=variables, attrs=data.attrs)
+
     def __repr__(self) -> str:
-        time = self.data["time"].values
+        time = self.variables["time"].values
         reached = f"{float(time[-1]):g} s" if time.size else "nothing"
         return f"<Run {str(self.path)!r}: {self.config.name}, {self.status}, {reached}>"
 
@@ -81,19 +108,19 @@ class Run:
     @property
     def start_s(self) -> float:
         """Simulated time at which this run started, s: 0 unless it continues another."""
-        return float(self.data.attrs.get("resumed_at_s", 0.0))
+        return float(self.attrs.get("resumed_at_s", 0.0))
 
     @property
     def wall_time_s(self) -> float:
         """Wall-clock time from the start of the run to its last sample, s; 0 without samples."""
-        wall = self.data["wall_time"].values
+        wall = self.variables["wall_time"].values
         return float(wall[-1]) if wall.size else 0.0
 
     @property
     def real_time_factor(self) -> float:
         """Simulated time over wall-clock time; NaN for a run that did not get beyond its start."""
         wall_s = self.wall_time_s
-        time = self.data["time"].values
+        time = self.variables["time"].values
         simulated_s = float(time[-1]) - self.start_s if time.size else 0.0
         return simulated_s / wall_s if simulated_s > 0 and wall_s > 0 else float("nan")
 
@@ -115,57 +142,76 @@ def open_run(path: str | Path) -> Run:
         RunFileError: There is no such file, it is no annelid run, or it is truncated or damaged.
     """
     file = examined_file(path)[0]
-    with present_data(file) as dataset:
-        marks = dataset[[*_BOOKKEEPING, WARNINGS, CPU_TIME]].load()
-        n_samples = _count(marks, "samples_written", dataset.sizes["time"])
-        n_frames = _count(marks, "frames_written", dataset.sizes["frame"])
-        status = STATUSES[_count(marks, "status_code", len(STATUSES) - 1)]
-        kept = dataset.drop_vars([*marks.data_vars])
-        for name, variable in kept.variables.items():
-            # Labels of a dimension may be words.
-            if variable.dtype.kind not in "fiu" and variable.dims != (name,):
-                raise ValueError(f"{name!r} holds no numbers")
-            if variable.dims[:1] not in (("time",), ("frame",), (name,)) and name != "stretch_rest_length":
-                raise ValueError(f"{name!r} is along {variable.dims}, not along time or frame")
-        data = kept.isel(time=slice(n_samples), frame=slice(n_frames)).load()
-        message = str(marks["status_message"].values)
-        doubts = tuple(str(marks[WARNINGS].values).splitlines())
-        cpu_time_s = float(marks[CPU_TIME])
-    return Run(file, data, config_in(file, data.attrs), status, message, doubts, cpu_time_s)
+    with open_checked(file) as content:
+        attrs, doubts = migrated(_attributes(content), _text(content, WARNINGS).splitlines())
+        n_samples = _count(content, "samples_written", content["time"].size)
+        n_frames = _count(content, "frames_written", content["frame_time"].size)
+        status = STATUSES[_count(content, "status_code", len(STATUSES) - 1)]
+        variables = _variables(content, {"time": n_samples, "frame": n_frames})
+        cpu_time_s = float(content[CPU_TIME][()]) if CPU_TIME in content else 0.0
+        message = _text(content, "status_message")
+    return Run(file, variables, attrs, config_in(file, attrs), status, message, tuple(doubts), cpu_time_s)
 
 
-def migrated(data: xarray.Dataset) -> xarray.Dataset:
-    """Returns all variables and attributes of a run file of any schema up to the present one in the present one.
+def _variables(content: Any, written: dict[str, int]) -> dict[str, Recorded]:
+    """Reads what was recorded, cut to what was written along a dimension."""
+    import h5py
 
-    Files of schema 0, those of annelid 0.1, have neither warnings nor processor time. Their configuration is valid as
-    it is: fields that are newer default to what 0.1 did, guards excepted. Signals that 0.1 did not record stay absent.
-    Those up to schema 1 name no published numbers. Where a field acted that is gone
+    variables, sizes = dict[str, Recorded](), dict(written)
+    for name, variable in content.items():
+        # A dimension without labels has no variable.
+        only_size = variable.attrs.get("NAME", b"").startswith(WITHOUT_LABELS.encode())
+        if only_size or name in (*_BOOKKEEPING, WARNINGS, CPU_TIME, "checkpoint"):
+            continue
+        dims = (name,) if variable.is_scale else tuple(dim[0].name.lstrip("/") for dim in variable.dims)
+        # Labels of a dimension may be words.
+        if variable.dtype.kind not in "fiu" and dims != (name,):
+            raise ValueError(f"{name!r} holds no numbers")
+        if dims[:1] not in (("time",), ("frame",), (name,)) and name != "stretch_rest_length":
+            raise ValueError(f"{name!r} is along {dims}, not along time or frame")
+        words = h5py.check_string_dtype(variable.dtype)
+        values = variable.asstr()[:].astype(str) if words else variable[: written.get(dims[0])]
+        if any(sizes.setdefault(dim, size) != size for dim, size in zip(dims, values.shape, strict=True)):
+            raise ValueError(f"{name!r} has shape {values.shape}, others have {sizes}")
+        variables[name] = Recorded(dims, values, _attributes(variable))
+    return variables
+
+
+def _attributes(part: Any) -> dict[str, Any]:
+    """The attributes of an open file or of one of its variables; what netCDF-4 keeps as a list of one is that one."""
+    kept = {name: part.attrs[name] for name in part.attrs if name not in _OF_THE_FORMAT and name[:2] != "_N"}
+    return {name: value[0] if np.shape(value) == (1,) else value for name, value in kept.items()}
+
+
+def _text(content: Any, name: str) -> str:
+    """The text of a variable of single characters; none in files that are older than it."""
+    return content[name][()].tobytes().rstrip(b"\0").decode() if name in content else ""
+
+
+def migrated(attrs: Mapping[str, Any], doubts: list[str]) -> tuple[dict[str, Any], list[str]]:
+    """Returns the attributes and warnings of a run file of any schema up to the present one in the present one.
+
+    The configuration of files of schema 0, those of annelid 0.1, is valid as it is: fields that are newer default to
+    what 0.1 did, guards excepted. Those up to schema 1 name no published numbers. Where a field acted that is gone
     (`annelid.config.checking.gone_fields`), the run says so among its warnings, and is not continued.
     """
-    if data.attrs.get(SCHEMA, 0) < 1:
-        added = {WARNINGS: ((), ""), CPU_TIME: ((), 0.0)}
-        data = data.assign({name: value for name, value in added.items() if name not in data})
-    return _without_gone_fields(data).assign_attrs({SCHEMA: SCHEMA_VERSION})
-
-
-def _without_gone_fields(data: xarray.Dataset) -> xarray.Dataset:
+    attrs = {**attrs, SCHEMA: SCHEMA_VERSION}
     try:
-        tree, acted = present_fields(parse_json(data.attrs["config"], "the configuration"))
+        tree, acted = present_fields(parse_json(attrs["config"], "the configuration"))
         for path in acted:
             *above, leaf = path.split(".")
             del reduce(getitem, above, tree)[leaf]
         if tree["body"].get("strands", {}).get("damping_time_s", 0.0) is None:
             del tree["body"]["strands"]["damping_time_s"]
     except (UnreadableText, KeyError, TypeError, ValueError, AttributeError):
-        return data  # What is wrong with it, its reader says.
+        return attrs, doubts  # What is wrong with it, its reader says.
     if acted:
-        told = (
+        doubts = doubts + [
             f"{path} was {value}, a field that is gone ({gone_fields()[path]['now']}): its command does not repeat it"
             for path, value in sorted(acted.items())
-        )
-        data = data.assign({WARNINGS: ((), "\n".join(filter(None, (str(data[WARNINGS].values), *told))))})
-        data = data.assign_attrs({ACTED: ", ".join(sorted(acted))})
-    return data.assign_attrs(config=json.dumps(tree))
+        ]
+        attrs[ACTED] = ", ".join(sorted(acted))
+    return {**attrs, "config": json.dumps(tree)}, doubts
 
 
 @contextmanager
@@ -200,29 +246,31 @@ def _reading(file: Path) -> Iterator[None]:
 
 
 @contextmanager
-def present_data(file: Path) -> Iterator[xarray.Dataset]:
-    """Opens a checked run file in the present schema."""
-    import xarray
+def open_checked(file: Path) -> Iterator[Any]:
+    """Opens an examined file."""
+    import h5py
 
-    with _reading(file), xarray.open_dataset(file, engine="h5netcdf") as dataset:
-        yield migrated(dataset)
+    with _reading(file), h5py.File(file) as content:
+        yield content
+
+
+def read_attributes(path: str | Path) -> tuple[Path, dict[str, Any]]:
+    """Returns a run's file and its global attributes in the present schema; raises as `open_run`."""
+    file = examined_file(path)[0]
+    with open_checked(file) as content:
+        return file, migrated(_attributes(content), [])[0]
 
 
 def read_config(path: str | Path) -> RunConfig:
     """Reads the configuration of a run, from its folder or its file; raises as `open_run`."""
-    file = examined_file(path)[0]
-    with present_data(file) as dataset:
-        return config_in(file, dataset.attrs)
+    return config_in(*read_attributes(path))
 
 
 def read_checkpoint(path: str | Path) -> Checkpoint:
     """Reads the last checkpoint of a run; raises as `open_run`, or where the run has no checkpoint."""
-    import h5py
-
     file = examined_file(path)[0]
-    with _reading(file):
-        with h5py.File(file, "r") as content:
-            slots = [content[name][()].tobytes() for name in SLOTS if name in content]  # type: ignore[index]
+    with open_checked(file) as content:
+        slots = [content[name][()].tobytes() for name in SLOTS if name in content]
         payload = newest_payload(slots)
         if payload is not None:
             return Checkpoint.from_bytes(payload)
@@ -250,7 +298,9 @@ def refuse_used_folder(out: Path, overwrite: bool) -> None:
         # A draft is left where a process was killed while it laid out its file.
         ours = LOCK_NAME, ".run.*.part.nc"
         if out.is_dir() and not overwrite and not all(any(map(entry.match, ours)) for entry in out.iterdir()):
-            raise ConfigError(f"the output folder {out} is not empty: name another, or allow overwriting")
+            raise ConfigError(
+                f"the output folder {out} is not empty: name another, or replace its run with --force (overwrite=True)"
+            )
     except OSError as error:
         raise RunFileError(f"cannot use the output folder {out}: {error.strerror}") from None
 
@@ -276,7 +326,9 @@ def examined_file(path: str | Path, *, whole: bool = False) -> tuple[Path, diges
         if state == "damaged":
             raise RunFileError(f"{file} is damaged: it is not as it was when the run ended")
         if not h5py.is_hdf5(file):
-            raise RunFileError(f"{file} is not an annelid run: it is not a netCDF-4 file")
+            made = f": annelid run {file} makes a run of a configuration, with --network of a network"
+            hint = made if file.suffix == ".toml" else ""
+            raise RunFileError(f"{file} is not an annelid run: it is not a netCDF-4 file{hint}")
         with h5py.File(file, "r") as content:
             # First, since a newer file may hold what the present schema does not.
             schema = _schema_of(content)
@@ -304,8 +356,8 @@ def _schema_of(content: h5py.File) -> int:
     return int(np.asarray(content.attrs[SCHEMA]).item())
 
 
-def _count(marks: xarray.Dataset, name: str, most: int) -> int:
-    value = int(marks[name])
+def _count(content: Any, name: str, most: int) -> int:
+    value = int(content[name][()])
     if not 0 <= value <= most:
         raise ValueError(f"{name} is {value}, not in 0 .. {most}")
     return value

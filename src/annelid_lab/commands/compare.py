@@ -82,7 +82,7 @@ def compare_command(
     from annelid.output import write_json
     from annelid.simulation import open_run
 
-    if len(runs) == 2 and runs[1].is_file() and runs[1].suffix != ".nc":
+    if len(runs) == 2 and runs[1].is_file() and runs[1].suffix != ".nc" and ".toml" not in (one.suffix for one in runs):
         _propose_map(*runs)
     if len(runs) < 2:
         raise typer.BadParameter("name at least two runs to compare")

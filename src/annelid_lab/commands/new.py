@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from annelid.cli import Force, command, print_paths, refuse_existing
+from annelid.cli import Force, command, complain, print_paths, refuse_existing
 
 
 @command("new", "Make")
@@ -48,11 +48,15 @@ def new_command(
     annelid new tube.toml --strand-radius 0.003 --young-modulus 2.2e8
     annelid run mine.toml
     """
+    from annelid.config import load_config
     from annelid.output import write_text
-    from annelid_lab.scaled_worm import worm_text
+    from annelid.plausibility import refuse_nonsense
+    from annelid_lab.scaled_worm import similar_worm, worm_text
 
     if path.suffix != ".toml":
         raise typer.BadParameter(f"{path} must end in .toml")
     refuse_existing(path, force, "")
-    text = worm_text(radius, segments, helices, length, rear_radius, segment_length, strand_radius, young_modulus)
-    print_paths([write_text(path, text)])
+    own = similar_worm(radius, segments, helices, length, rear_radius, segment_length, strand_radius, young_modulus)
+    print_paths([write_text(path, worm_text(own))])
+    for doubt in refuse_nonsense(load_config(path)):
+        complain(f"warning: {doubt}")

@@ -67,6 +67,13 @@ class Pair:
         faster: Share of tasks and draws in which the first is faster, half of those in which both are alike.
         faster_low: Lower end of its interval.
         faster_high: Upper end.
+        slip: Work lost to friction per metre by the first, over that by the second, of the runs that neither was
+            refused and in which both got ahead; NaN if there are none.
+        slip_low: Lower end of its interval.
+        slip_high: Upper end.
+        work: The same of the muscles' positive work.
+        work_low: Lower end of its interval.
+        work_high: Upper end.
         at_half_step: The difference at half the step, on the draws that were run there; NaN if none were.
         at_step: The difference at the tasks' step on the same draws.
     """
@@ -80,6 +87,12 @@ class Pair:
     faster: float
     faster_low: float
     faster_high: float
+    slip: float
+    slip_low: float
+    slip_high: float
+    work: float
+    work_low: float
+    work_high: float
     at_half_step: float
     at_step: float
 
@@ -92,31 +105,67 @@ class Speeds:
         cells: Body and task of every cell.
         speed_m_per_s: ``(n_entrants, n_cells, n_draws)``.
         ratio: The same over the reference's mean of the cell.
+        way_m: Ways, likewise; NaN where the worm did not get ahead.
+        slip_J: Work lost to friction, likewise.
+        work_J: Positive work of the muscles, likewise.
     """
 
     def __init__(self, scores: Sequence[Score]) -> None:
         """Arranges scores; every entrant must have run every cell with the same draws, the reference among them."""
-        of = {(one.entrant, (one.body, one.task), one.seed): one.speed_m_per_s for one in scores}
+        of = {(one.entrant, (one.body, one.task), one.seed): one for one in scores}
         self.entrants = list(dict.fromkeys(name for name, _, _ in of))
         self.cells = list(dict.fromkeys(cell for _, cell, _ in of))
         seeds = list(dict.fromkeys(seed for _, _, seed in of))
-        self.speed_m_per_s: Array = np.array(
-            [[[of[name, cell, seed] for seed in seeds] for cell in self.cells] for name in self.entrants]
-        )
+
+        def each(name: str) -> Array:
+            return np.array(
+                [[[getattr(of[e, cell, seed], name) for seed in seeds] for cell in self.cells] for e in self.entrants]
+            )
+
+        self.speed_m_per_s = each("speed_m_per_s")
         mean = self.speed_m_per_s[self.entrants.index(REFERENCE)].mean(axis=-1)
         self.ratio: Array = self.speed_m_per_s / np.maximum(mean, LEAST_REFERENCE_M_PER_S)[:, np.newaxis]
+        way_m = each("distance_m")
+        self.way_m, self.slip_J, self.work_J = np.where(way_m > 0, way_m, np.nan), each("slip_J"), each("work_J")
 
 
 def _interval(values: Array) -> tuple[float, float, float]:
     """Returns the mean over cells and draws, ``(n_cells, n_draws)``, and its interval by bootstrap (percentiles)."""
-    n_cells, n_draws = values.shape
-    if n_draws < 2:
+    if values.shape[1] < 2:
         return float(values.mean()), nan, nan
+    low, high = np.percentile(values[_resampled(*values.shape)].mean(axis=(1, 2)), (2.5, 97.5)).tolist()
+    return float(values.mean()), low, high
+
+
+def _resampled(n_cells: int, n_draws: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Draws cells, and draws of each cell, with replacement, `RESAMPLES` times."""
     rng = np.random.default_rng(0)
     cells = rng.integers(n_cells, size=(RESAMPLES, n_cells))[..., np.newaxis]
-    means = values[cells, rng.integers(n_draws, size=(RESAMPLES, n_cells, n_draws))].mean(axis=(1, 2))
-    low, high = np.percentile(means, (2.5, 97.5)).tolist()
-    return float(values.mean()), low, high
+    return cells, rng.integers(n_draws, size=(RESAMPLES, n_cells, n_draws))
+
+
+def _cost_ratio(energy_J: Array, way_m: Array) -> tuple[float, float, float]:
+    """Returns energy per metre of the first entrant over that of the second, and its interval by bootstrap.
+
+    Args:
+        energy_J: ``(2, n_cells, n_draws)``.
+        way_m: Likewise. Runs in which either of both is NaN do not count.
+    """
+    counts = np.isfinite(energy_J * way_m).all(axis=0)
+    if not counts.any():
+        return nan, nan, nan
+    energy, way = (np.where(counts, values, 0.0) for values in (energy_J, way_m))
+
+    def ratio(axes: tuple[int, int], where: tuple[NDArray[np.int64], ...] = ()) -> Array:
+        first, second = ((e[where].sum(axis=axes) / w[where].sum(axis=axes)) for e, w in zip(energy, way, strict=True))
+        return first / second
+
+    mean = float(ratio((0, 1)))
+    if way_m.shape[-1] < 2:
+        return mean, nan, nan
+    with np.errstate(invalid="ignore"):
+        low, high = np.nanpercentile(ratio((1, 2), _resampled(*way_m.shape[1:])), (2.5, 97.5)).tolist()
+    return mean, low, high
 
 
 def standings(scores: Sequence[Score]) -> list[Standing]:
@@ -170,15 +219,18 @@ def pairs(scores: Sequence[Score]) -> list[Pair]:
     """Compares every two entrants on the same draws, over all tasks and on each body."""
     speeds = Speeds([one for one in scores if one.finer == 1])
     finer = {(one.entrant, one.body, one.task, one.seed) for one in scores if one.finer != 1}
-    both = [one for one in scores if (one.entrant, one.body, one.task, one.seed) in finer]
-    coarse, fine = ([one for one in both if (one.finer == 1) == at_step] for at_step in (True, False))
+    twice = [one for one in scores if (one.entrant, one.body, one.task, one.seed) in finer]
+    coarse, fine = ([one for one in twice if (one.finer == 1) == at_step] for at_step in (True, False))
     beside = (Speeds(coarse), Speeds(fine)) if finer else None
     found = []
     for body in (ALL, *dict.fromkeys(body for body, _ in speeds.cells)):
         cells = [i for i, cell in enumerate(speeds.cells) if body in (ALL, cell[0])]
         for first, second in combinations(speeds.entrants, 2):
-            one, other = (speeds.ratio[speeds.entrants.index(name)][cells] for name in (first, second))
+            both = [speeds.entrants.index(name) for name in (first, second)]
+            one, other = speeds.ratio[both][:, cells]
             numbers = (*_interval(one - other), *_interval((one > other) + 0.5 * (one == other)))
+            for energy in (speeds.slip_J, speeds.work_J):
+                numbers += _cost_ratio(energy[both][:, cells], speeds.way_m[both][:, cells])
             steps = (nan, nan) if beside is None else [_difference(each, first, second, body) for each in beside[::-1]]
             found.append(Pair(first, second, body, *(float(f"{number:.4g}") for number in (*numbers, *steps))))
     return found

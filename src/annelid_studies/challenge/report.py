@@ -14,7 +14,7 @@ from rich.table import Table as TerminalTable
 from annelid.draw import canvas, panel_title, save_both, segment_colors
 from annelid.markdown import Table
 from annelid.output import write_csv
-from annelid_studies.challenge.ranking import ALL, Array, Pair, Speeds, Standing, mean_ranks
+from annelid_studies.challenge.ranking import ALL, Array, Pair, Speeds, Standing, mean_ranks, standings
 from annelid_studies.challenge.scores import Score
 from annelid_studies.tables import grouped, tabulated, terminal_table
 
@@ -85,8 +85,9 @@ def refused_table(scores: Sequence[Score]) -> TerminalTable:
     return terminal_table(Table(["entrant", "body", "task", "runs", "reason"], rows), "Refused runs", n_words=5)
 
 
-def ranking_figure(found: Sequence[Standing], speeds: Speeds, stem: Path) -> Path:
+def ranking_figure(scores: Sequence[Score], stem: Path) -> Path:
     """Draws speeds with their intervals over each body, and mean ranks with the critical difference."""
+    found, speeds = standings(scores), Speeds([one for one in scores if one.finer == 1])
     names = [one.entrant for one in found if one.task == one.body == ALL]
     of = {(one.entrant, one.body): one for one in found if one.task == ALL}
     bodies = list(dict.fromkeys(body for body, _ in speeds.cells))
@@ -121,9 +122,10 @@ def pairs_table(found: Sequence[Pair], reference: str) -> TerminalTable:
         "body": lambda one: one.body,
         "difference": lambda one: _with_interval(one.difference, one.difference_low, one.difference_high),
         "faster": lambda one: _with_interval(one.faster, one.faster_low, one.faster_high),
+        "slip": lambda one: _with_interval(one.slip, one.slip_low, one.slip_high),
         "at half the step": lambda one: f"{one.at_half_step:+.2f}" if isfinite(one.at_half_step) else "-",
         "same draws": lambda one: f"{one.at_step:+.2f}" if isfinite(one.at_step) else "-",
     }
     rows = [one for one in found if reference in (one.first, one.second)]
-    caption = "difference of speeds over the reference's; faster: share of tasks and draws"
+    caption = "difference of speeds over the reference's; faster: share of tasks and draws; slip: first over second"
     return terminal_table(tabulated(rows, columns), f"Beside {reference}", n_words=2, caption=caption)

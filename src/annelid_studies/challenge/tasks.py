@@ -32,7 +32,7 @@ REFERENCE = "timed"
 FIRST_TEST_SEED = 1000
 QUICK_TASKS, QUICK_ENTRANTS, QUICK_BODIES = ("level", "slope"), (REFERENCE, "discrete", "sns"), ("three",)
 QUICK_DRAWS, QUICK_DURATION_S = 2, 6.0
-HALF_OF = 4
+HALF_OF = 8
 """One in so many draws is run at half the step, too."""
 DIGITS = 4
 """Significant digits of what is drawn."""

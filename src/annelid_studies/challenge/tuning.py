@@ -18,7 +18,7 @@ from annelid.output import write_text
 from annelid_studies.challenge.scores import challenge
 from annelid_studies.challenge.tasks import DIGITS, Entrant, Range, all_tasks, entries
 
-SEARCHED, FINAL = "level", ("level", "friction", "slope")
+SEARCHED, FINAL = "level", ("friction", "slope")
 """Task of the search, and tasks of the final round; for an entrant with ``each_task``, both are its task."""
 SEEDS = (0, 1)
 """Training seeds: the search has the first, the final round all."""

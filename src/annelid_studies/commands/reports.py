@@ -48,7 +48,7 @@ def paper_command(
 
     Writes report.html, one file with all pictures, and report.md with its figures. It takes about an hour on two cores,
     with --quick about six minutes. Every run is kept in report/runs, so a second call continues where the first was
-    stopped. Without OpenGL the report leaves out figures 4 and 8, and says so.
+    stopped.
 
     \b
     annelid study paper                              into the folder report
@@ -193,7 +193,7 @@ def challenge_command(
     ] = None,
     draws: Annotated[int, typer.Option(min=1, max=1000, help="Draws of every task.")] = 8,
     half_step: Annotated[
-        bool, typer.Option("--half-step/--no-half-step", help="Run one draw in four at half the step, too.")
+        bool, typer.Option("--half-step/--no-half-step", help="Run one draw in eight at half the step, too.")
     ] = True,
     tune: Annotated[
         int | None,
@@ -231,16 +231,16 @@ def challenge_command(
     policy.toml, a file of entrants, and the learning curves policy.csv and policy.png. It takes hours.
 
     \b
-    annelid study challenge --quick                                   in minutes
-    annelid study challenge                                           all entrants, tasks and bodies
-    annelid study challenge mine:Controller --task slope --draws 4    your own, against the reference
-    annelid study challenge mine.toml --with published/runs.csv       only yours is computed
-    annelid study challenge mine.toml --tune 48 -o tuned              tune yours as ours were
-    annelid study challenge --train 40000 --body three -o trained     train a network
+    annelid study challenge --quick                             in minutes
+    annelid study challenge                                     everything
+    annelid study challenge mine:Controller --task slope        your own
+    annelid study challenge mine.toml --with published.csv      only yours runs
+    annelid study challenge mine.toml --tune 32 -o tuned        tune it first
+    annelid study challenge --train 40000 -o trained            train a network
     """
     from annelid.experiment import study_progress
     from annelid_studies.challenge import report, tasks
-    from annelid_studies.challenge.ranking import Pair, Speeds, Standing, half_step_changes, pairs, standings
+    from annelid_studies.challenge.ranking import Pair, Standing, half_step_changes, pairs, standings
     from annelid_studies.challenge.scores import Score, challenge, read_scores
     from annelid_studies.challenge.tuning import Trial, write_entrants
     from annelid_studies.challenge.tuning import tune as tuned
@@ -283,7 +283,7 @@ def challenge_command(
         report.write_rows(Score, every, output / "runs.csv"),
         report.write_rows(Standing, ranked, output / "scores.csv"),
         report.write_rows(Pair, compared, output / "pairs.csv"),
-        report.ranking_figure(ranked, Speeds([one for one in scores if one.finer == 1]), output / "challenge"),
+        report.ranking_figure(scores, output / "challenge"),
     ]
     tables = [report.ranking_table(ranked, changes), report.speed_table(ranked)]
     tables.append(report.pairs_table(compared, tasks.REFERENCE))

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from annelid.draw import framed_table
+from rich.table import Table
+
 from annelid_studies.limit_cycle.cycle import LimitCycle
-
-if TYPE_CHECKING:
-    from rich.table import Table
 
 _MULTIPLIERS_SHOWN = 4
 # A smaller multiplier is lost in products of rounded matrices.
@@ -20,11 +18,11 @@ def cycle_table(name: str, cycle: LimitCycle) -> Table:
     caption = "A multiplier is what one cycle leaves of a small deviation; the one at 1 is a shift along the cycle."
     title = f"{name}: limit cycle in {len(cycle.labels)} states"
     # Title and caption would fold.
-    table = framed_table("quantity", "", title=title, caption=caption, min_width=72)
+    table = Table("quantity", "", title=title, caption=caption, box=None, min_width=72)
     table.add_row("period (ms)", f"{1e3 * cycle.period_s:.2f}")
     for i, multiplier in enumerate(cycle.multipliers[:_MULTIPLIERS_SHOWN], start=1):
         table.add_row(f"multiplier {i}", _multiplier(multiplier))
-    table.add_row("orbit closes within", f"{cycle.closing_error:.0e} of a range")
+    table.add_row("orbit closes within", f"{cycle.closing_error:.0e} of a size")
     return table
 
 
@@ -32,7 +30,6 @@ def cycle_numbers(cycle: LimitCycle) -> dict[str, Any]:
     """Returns the same numbers for JSON: multipliers as pairs of real and imaginary part, times in s."""
     return {
         "period_s": cycle.period_s,
-        "timestep_s": cycle.timestep_s,
         "closing_error": cycle.closing_error,
         "multipliers": [[float(value.real), float(value.imag)] for value in cycle.multipliers],
         "trivial": cycle.trivial,

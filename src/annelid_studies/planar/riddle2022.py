@@ -10,7 +10,7 @@ from pydantic import Field
 from annelid.clock import StepRatio
 from annelid.config import Positive
 from annelid.errors import ConfigError
-from annelid.protocols import Array, SavedAndRecorded, Sensation, State, Values
+from annelid.protocols import Array, SavedAndRecorded, Sensation, Values
 from annelid_studies.planar.sections import PlanarWorm, rhombi
 
 if TYPE_CHECKING:
@@ -94,43 +94,33 @@ class Riddle2022Plant(SavedAndRecorded):
 
     def step(self, activation: Array) -> Sensation:
         """Advances by one control step, as `annelid.Plant.step`; activation 1 commands the smallest height."""
-        self._now = self.step_copies(self._now, activation)
+        n_control_steps = int(self._now["n_control_steps"]) + 1
+        height_m, target_m = self._now["height"].astype(np.float64), self._target_m(activation)
+        for _ in range(self._ratio.physics_steps_due(n_control_steps)):
+            height_m += self._approach * (target_m - height_m)
+        self._now = {"height": height_m, "n_control_steps": np.array(n_control_steps)}
         return self.sense()
 
     def sense(self) -> Sensation:
         """Returns what the body senses at this instant."""
-        return self.sense_copies(self._now)
-
-    def step_copies(self, states: State, activation: Array) -> State:
-        """Advances many copies by one control step at once, as `step` does one; changes nothing here.
-
-        Args:
-            states: As `get_state` returns them, the heights (m) with one more axis in front, ``n_copies`` long.
-            activation: Shape ``(n_copies, n_segments)``.
-
-        Returns:
-            The states one step on.
-        """
-        body, height_m = self._body, states["height"].astype(np.float64)
-        n_control_steps = int(states["n_control_steps"]) + 1
-        target = body.height_max_m - np.asarray(activation) * (body.height_max_m - body.height_min_m)
-        for _ in range(self._ratio.physics_steps_due(n_control_steps)):
-            height_m += self._approach * (target - height_m)
-        return {"height": height_m, "n_control_steps": np.array(n_control_steps)}
-
-    def sense_copies(self, states: State) -> Sensation:
-        """Returns what many copies sense: every array with their axis in front, and one time for all."""
-        height_m = states["height"].astype(np.float64)
-        copies = height_m.shape[:-1]
+        height_m = self._now["height"].astype(np.float64)
         return Sensation(
-            time_s=int(states["n_control_steps"]) * self._ratio.control_timestep_s,
-            stretch_m=self._length(height_m)[..., np.newaxis],
-            rest_stretch_m=self._rest_length_m + np.zeros((*copies, 1, 1)),
+            time_s=int(self._now["n_control_steps"]) * self._ratio.control_timestep_s,
+            stretch_m=self._length(height_m)[:, np.newaxis],
+            rest_stretch_m=self._rest_length_m.copy(),
             ring_length_m=height_m,
-            muscle_force_N=np.full(height_m.shape, np.nan),
-            contact_force_N=np.zeros((*height_m.shape, 3)),
-            center_of_mass_m=np.full((*copies, 3), np.nan),
+            muscle_force_N=np.full(self.n_segments, np.nan),
+            contact_force_N=np.zeros((self.n_segments, 3)),
+            center_of_mass_m=np.full(3, np.nan),
         )
+
+    def height_rate_m_per_s(self, height_m: Array, activation: Array) -> Array:
+        """Returns how fast heights change, m/s, for any number of worms, ``(.., n_segments)``."""
+        return self._body.gain * _RATE_PER_S * (self._target_m(activation) - height_m)
+
+    def lengthening_m(self, height_m: Array) -> Array:
+        """Returns how much longer than at rest segments of these heights are, m, ``(.., n_segments)``."""
+        return self._length(height_m) - self._rest_length_m[:, 0]
 
     def _values(self) -> Values:
         sensed = self.sense()
@@ -145,6 +135,9 @@ class Riddle2022Plant(SavedAndRecorded):
 
     def _attrs(self) -> dict[str, float | int | str]:
         return {"plant": "planar kinematic worm of Riddle et al. 2022"}
+
+    def _target_m(self, activation: Array) -> Array:
+        return self._body.height_max_m - np.asarray(activation) * (self._body.height_max_m - self._body.height_min_m)
 
     def _length(self, height_m: Array) -> Array:
         return np.sqrt((2.0 * self._body.side_m) ** 2 - height_m * height_m)

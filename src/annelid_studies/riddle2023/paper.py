@@ -61,8 +61,7 @@ def reproduce(
         progress: Called as the work goes on.
 
     Returns:
-        The report, whose pictures are drawn: where there is no OpenGL, without those that are rendered, and its summary
-        says so.
+        The report, whose pictures are drawn.
 
     Raises:
         ConfigError: An examination has no such name.
@@ -87,18 +86,13 @@ def reproduce(
         series |= {f"{label}, mean of six": walked_elongation(store[variants[label]]).tolist() for label in _QUICK}
         pictures = folder / "figures"
         pictures.mkdir(parents=True, exist_ok=True)
-        drawn = list(FIGURES)
-        if not renderings.rendering_works():
-            drawn = [number for number in FIGURES if number not in RENDERED]
-            left_out = " and ".join(map(str, RENDERED))
-            summary.append(f"Figures {left_out} need OpenGL, which this machine lacks (`annelid doctor`).")
-        for i, number in enumerate(drawn):
+        for i, number in enumerate(FIGURES):
             if progress is not None:
-                progress("drawing", i, len(drawn), i / len(drawn))
+                progress("drawing", i, len(FIGURES), i / len(FIGURES))
             stem, title = pictures / f"figure_{number}", texts("figures/figures.toml")[str(number)]["title"]
             figures.append(Figure(number, title, stem.with_suffix(".png"), FIGURES[number](main, series, stem)))
         if progress is not None:
-            progress("drawing", len(drawn), len(drawn), 1.0)
+            progress("drawing", len(FIGURES), len(FIGURES), 1.0)
         evidence = Evidence(store, effort, {one.examination.name: one.findings for one in examined})
         claims, judging = paper_claims(evidence), rule(evidence)
     return Report(
@@ -152,15 +146,15 @@ FIGURES: Mapping[int, Callable[[Run, Series, Path], str]] = {
     9: lambda run, series, stem: robot_lengths.figure_9_robot_lengths(series, stem),
 }
 """What draws each figure and returns its caption."""
-RENDERED = (4, 8)
-"""Figures that need OpenGL."""
 
 
 def _variants_table(variants: Mapping[str, Outcome]) -> Table:
     rows: dict[tuple[str, str], Callable[[Outcome], str]] = {
         ("order of onsets", "1-2-3"): order_of,
         ("period (s)", f"about {PAPER_PERIOD_S:g} (Fig. 7)"): lambda o: words.in_unit(o.rhythm.period_s, digits=3),
-        ("elongation, first helix, peak to peak (cm)", words.all_in_cm(PAPER_ELONGATION_M)): _helix,
+        ("elongation, first helix, peak to peak (cm)", words.all_in_cm(PAPER_ELONGATION_M)): (
+            lambda o: words.all_in_cm(walked_elongation(o, first_helix=True))
+        ),
         ("elongation, mean of six, maximum (cm)", ""): lambda o: words.all_in_cm(walked_elongation(o)),
         ("segment 2 below segment 1 (%)", words.in_percent(PAPER_MIDDLE_DEFICIT, 1)): (
             lambda o: words.in_percent(o.summary.middle_deficit, 1)
@@ -179,10 +173,6 @@ def _variants_table(variants: Mapping[str, Outcome]) -> Table:
     return Table(
         ["quantity", "paper", *variants], [[*head, *map(text, variants.values())] for head, text in rows.items()]
     )
-
-
-def _helix(outcome: Outcome) -> str:
-    return words.all_in_cm(walked_elongation(outcome, first_helix=True))
 
 
 def _beside_the_paper(main: Outcome) -> Table:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from math import radians
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -30,11 +29,6 @@ class Ground(ArenaKind):
 
     floor_gap_m: NonNegative = Field(default=0.009, description="distance of the floor below the mesh's lowest line")
     slope_deg: Slope = 0.0
-
-    @property
-    def slope_rad(self) -> float:
-        """As `slope_deg`, in rad."""
-        return radians(self.slope_deg)
 
     @property
     def floor_depth_m(self) -> float:

@@ -86,11 +86,6 @@ class Pipe(ArenaKind):
         return self
 
     @property
-    def slope_rad(self) -> float:
-        """As `slope_deg`, in rad."""
-        return radians(self.slope_deg)
-
-    @property
     def floor_depth_m(self) -> float:
         """Of a floor that is there to be seen only."""
         return PIPE_ABOVE_FLOOR_M

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from annelid.analysis.track import forward_position
-from annelid.draw.canvas import canvas, line_entries, line_looks, panel_title, save
+from annelid.draw.canvas import MOST_ROWS, canvas, evenly, line_entries, line_looks, panel_title, save
 from annelid.errors import RunFileError
 from annelid.protocols import Array
 from annelid.simulation.runfile import Run
@@ -17,7 +17,6 @@ from annelid.simulation.runfile import Run
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-MOST_ROWS = 6  # segments that get a panel: of more, as many from the first to the last, evenly spaced
 _CM = 100.0
 
 Values = Array | None  # one column per segment, ``(n_times, n_segments)``; None if they were not recorded
@@ -40,7 +39,7 @@ def lengths_figure(runs: Sequence[Run], labels: Sequence[str], path: Path) -> Pa
     if not any(drawn):
         raise RunFileError("none of these runs recorded lengths of segments or rings")
     n_segments = max(run.config.body.n_segments for run, shown in zip(runs, drawn, strict=True) if shown)
-    segments = np.linspace(0, n_segments - 1, min(n_segments, MOST_ROWS)).round().astype(int)
+    segments = evenly(n_segments, MOST_ROWS)
     with canvas(0.8 + 1.15 * len(segments)) as figure:
         grid = figure.subplots(len(segments), len(panels), sharex=True, sharey="col", squeeze=False)
         for i, (title, column) in enumerate(zip(panels, grid.T, strict=True)):

@@ -116,15 +116,13 @@ def uncertainty_figure(rows: Mapping[str, Mapping[str, Any]], path: str | Path) 
 def _draw_nested(axes: Axes, values: Array, errors: Mapping[str, Array]) -> None:
     """Draws values, ``(k,)``, and their errors by kind, the innermost first; NaN for what is not known."""
     places = np.arange(len(values))
-    square, below = np.zeros(len(values)), np.zeros(len(values))
+    square = np.zeros(len(values))
     styles = zip(_WIDTHS_PT, segment_colors(len(_WIDTHS_PT)), strict=True)
     for (kind, error), (width, color) in zip(errors.items(), styles, strict=True):
         square += np.nan_to_num(error) ** 2
-        end = np.sqrt(square)
-        axes.vlines(places, values - end, values - below, color=color, linewidth=width)
-        axes.vlines(places, values + below, values + end, color=color, linewidth=width, label=kind.replace("_", " "))
-        below = end
-    axes.plot(places, values, "_", color="0.1", markersize=16.0, markeredgewidth=1.6, label="this run")
+        end, look = np.sqrt(square), {"color": color, "linewidth": width, "zorder": 2.0 + 0.1 * width}
+        axes.vlines(places, values - end, values + end, label=kind.replace("_", " "), **look)
+    axes.plot(places, values, "_", color="0.1", markersize=16.0, markeredgewidth=1.6, label="this run", zorder=4.0)
     axes.set_xlim(-0.6, len(values) - 0.4)
     axes.grid(axis="x", visible=False)
     # Differences far below the values stay small.

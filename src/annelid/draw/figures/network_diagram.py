@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from annelid.config import RunConfig
-from annelid.draw.canvas import WIDTH_IN, canvas, plain, save
+from annelid.draw.canvas import MOST_ROWS, WIDTH_IN, canvas, evenly, line_looks, panel_title, plain, save
 from annelid.draw.figures import RUN_FIGURES
 from annelid.draw.plots import plot_path
 from annelid.errors import RunFileError
@@ -34,14 +34,14 @@ Effect = Literal["excitatory", "inhibitory", "gap junction", "rectified gap junc
 
 SYMBOLS = {"contraction": "U1", "expansion": "U2", "sensory": "U3", "relay": "U4"}
 """The paper's symbols of the neurons of a segment, by the part of a neuron's name before its segment's number."""
-_GREY, _ARROW = "#595959", "#4d4d4d"
-# Colour, dashes, corners of the mark at the end (0 for none), whether it is filled, and its marker in the key.
-# Dark and light in grey, hues far apart for colour-blind eyes.
-_LOOKS: dict[Effect, tuple[str, Any, int, bool, Any]] = {
-    "excitatory": ("#c2410c", "-", 3, False, ">"),
-    "inhibitory": ("#1b2a6b", "-", 40, True, "o"),
-    "gap junction": (_GREY, (0, (1, 1)), 0, False, None),
-    "rectified gap junction": (_GREY, (0, (1, 1)), 3, True, ">"),
+_INK = "#404040"
+# Dashes, corners of the mark at the end (0 for none), whether it is filled, and its marker in the key. Colours are for
+# the neurons.
+_LOOKS: dict[Effect, tuple[Any, int, bool, Any]] = {
+    "excitatory": ("-", 3, False, ">"),
+    "inhibitory": ("-", 40, True, "o"),
+    "gap junction": ((0, (1, 1)), 0, False, None),
+    "rectified gap junction": ((0, (1, 1)), 3, True, ">"),
 }
 _RADIUS = 0.27  # of a neuron
 _MARK = 0.075  # radius of the mark at the end of a connection
@@ -52,6 +52,7 @@ _LONGEST_LABEL = 7  # letters that can be read in a neuron
 _CROWDED, _ROOMY = 0.92, 0.6  # cosines of angles between lines at a neuron: they overlap, they have room
 _BENDS = (0.0, 0.25, -0.25, 0.4, -0.4, 0.6, -0.6, 0.8, -0.8, 1.1, -1.1)
 _UNIT_IN = (0.55, 1.0)  # least and largest length of a unit, inches
+_PANEL_IN = 0.95  # height of a panel of potentials
 _PAPER: Any = {"bbox": {"facecolor": "white", "edgecolor": "none", "pad": 0.5, "alpha": 0.8}, "zorder": 3}
 _NUMBERED = re.compile(r"(.+)_(\d{1,9})")
 
@@ -73,8 +74,8 @@ def network_figure(network: Network, path: str | Path) -> Path:
         RunFileError: The file has another suffix or cannot be written.
     """
     path = plot_path(path)
-    with _drawn(network) as figure:
-        _draw_key(figure, network)
+    with _drawn(network) as (figure, _):
+        _draw_key(figure, network, ())
         return save(figure, path, bbox_inches="tight", pad_inches=0.1)
 
 
@@ -84,7 +85,7 @@ def network_svg(network: Network) -> str:
 
     text = StringIO()
     nothing = dict.fromkeys(("Creator", "Date", "Format", "Type"))
-    with _drawn(network) as figure, matplotlib.rc_context({"svg.fonttype": "none"}):
+    with _drawn(network) as (figure, _), matplotlib.rc_context({"svg.fonttype": "none"}):
         figure.savefig(text, format="svg", bbox_inches="tight", transparent=True, metadata=nothing)
     return text.getvalue()[text.getvalue().index("<svg") :]
 
@@ -96,7 +97,10 @@ def network_of(config: RunConfig, neurons: Sequence[str]) -> Network | None:
 
 
 def run_network_figure(run: Run, path: str | Path) -> Path:
-    """Draws the network that a run's controller stepped, as `network_figure`.
+    """Draws the network that a run's controller stepped, as `network_figure`, and below it what its neurons did.
+
+    There is a panel for each segment, of many for evenly spaced ones, and one for neurons of no segment. A trace has
+    the colour of its neuron in the network.
 
     Raises:
         RunFileError: As of `network_figure`, or the run holds the potentials of no network.
@@ -107,7 +111,25 @@ def run_network_figure(run: Run, path: str | Path) -> Path:
     network = Network.from_toml(text) if isinstance(text, str) else network_of(run.config, neurons) if neurons else None
     if network is None:
         raise RunFileError(f"{run.path} holds no network to draw: its controller is {run.config.controller.kind}")
-    return network_figure(network, path)
+    segments, others = by_segment(neurons)
+    numbers = [list(segments)[i] for i in evenly(len(segments), MOST_ROWS)]
+    rows = {f"segment {number}": segments[number] for number in numbers} | (
+        {"others" * bool(segments): others} if others else {}
+    )
+    path = plot_path(path)
+    with _drawn(network, len(rows)) as (figure, panels):
+        looks, labels = looks_of(network), labels_of(network)
+        for axes, (name, row) in zip(panels, rows.items(), strict=True):
+            for neuron in row:
+                trace = run.data["potential"].values[:, neurons.index(neuron)]
+                gid = f"trace-{neurons.index(neuron)}"
+                axes.plot(run.data["time"].values, trace, **looks[labels[neuron]], gid=gid)
+            axes.set(ylabel=name, xlim=run.data["time"].values[[0, -1]])
+        if rows:
+            panel_title(panels[0], "Potentials above rest (mV)")
+            panels[-1].set_xlabel("time (s)")
+        _draw_key(figure, network, [labels[neuron] for row in rows.values() for neuron in row])
+        return save(figure, path, bbox_inches="tight", pad_inches=0.1)
 
 
 RUN_FIGURES.add("network", run_network_figure)
@@ -147,15 +169,16 @@ def labels_of(network: Network) -> dict[str, str]:
     return {name: shown[role_of(name)] if numbered else name for name in network.neurons}
 
 
-def meanings_of(network: Network) -> list[str]:
-    """Returns what labels stand for, ``"U1: contraction"``, of those that are not the names themselves."""
-    return list(
-        dict.fromkeys(
-            f"{label}: {role_of(name)}"
-            for name, label in labels_of(network).items()
-            if label not in (name, role_of(name))
-        )
-    )
+def meanings_of(network: Network) -> dict[str, str]:
+    """Returns what labels stand for, as U1 for contraction, of those that are not the names themselves."""
+    roles = {label: role_of(name) for name, label in labels_of(network).items() if label != name}
+    return {label: role for label, role in roles.items() if label != role}
+
+
+def looks_of(network: Network) -> dict[str, dict[str, Any]]:
+    """Returns colour and dashes of the neurons, by their labels: those of a role are alike."""
+    labels = list(dict.fromkeys(labels_of(network).values()))
+    return dict(zip(labels, line_looks(len(labels)), strict=True))
 
 
 def _shortened(role: str, roles: Iterable[str]) -> str:
@@ -259,28 +282,31 @@ def _cosines(one: Sequence[complex] | Path2D, other: complex) -> NDArray[np.floa
 
 
 @contextmanager
-def _drawn(network: Network) -> Iterator[Figure]:
-    """Gives a figure with the network, whose unit fits the width of a page."""
+def _drawn(network: Network, n_panels: int = 0) -> Iterator[tuple[Figure, list[Axes]]]:
+    """Gives a figure with the network, whose unit fits the width of a page, and empty panels below it."""
     places = place_neurons(network)
+    routes = list(route_connections(network, places))
     with canvas(1.0) as figure:
-        figure.set_layout_engine("none")
-        axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-        axes.set_aspect("equal")
-        axes.axis("off")
-        routes = list(route_connections(network, places))
-        _draw_columns(axes, network, places)
+        top, *panels = figure.subplots(1 + n_panels, 1, squeeze=False)[:, 0]
+        top.set_aspect("equal")
+        top.axis("off")
+        _draw_columns(top, network, places)
         for number, (link, route) in enumerate(zip(network.connections, routes, strict=True)):
-            _draw_connection(axes, route, effect_of(network, link), f"connection-{number}")
-        _draw_ends(axes, network, places, routes)
-        axes.update_datalim(
-            [(place.real + s, place.imag + s) for place in places.values() for s in (-_RADIUS, _RADIUS)]
-        )
-        box = axes.dataLim.padded(0.1)
+            _draw_connection(top, route, effect_of(network, link), f"connection-{number}")
+        _draw_ends(top, network, places, routes)
+        top.update_datalim([(place.real + s, place.imag + s) for place in places.values() for s in (-_RADIUS, _RADIUS)])
+        box = top.dataLim.padded(0.1)
         unit_in = min(max(WIDTH_IN / box.width, _UNIT_IN[0]), _UNIT_IN[1])
-        figure.set_size_inches(unit_in * box.width, unit_in * box.height)
-        axes.set(xlim=(box.x0, box.x1), ylim=(box.y0, box.y1))
-        _draw_neurons(axes, network, places, unit_in)
-        yield figure
+        heights = [unit_in * box.height, *[_PANEL_IN] * n_panels]
+        top.get_gridspec().set_height_ratios(heights)
+        figure.set_size_inches(max(unit_in * box.width, WIDTH_IN if panels else 0.0), sum(heights))
+        top.set(xlim=(box.x0, box.x1), ylim=(box.y0, box.y1))
+        _draw_neurons(top, network, places, unit_in)
+        for axes in panels[:-1]:
+            axes.sharex(panels[-1])
+            axes.sharey(panels[-1])
+            axes.tick_params(labelbottom=False)
+        yield figure, panels
 
 
 def _draw_columns(axes: Axes, network: Network, places: dict[str, complex]) -> None:
@@ -304,14 +330,14 @@ def _draw_connection(axes: Axes, route: Path2D, effect: Effect, gid: str) -> Non
     """Draws a path and the mark at its end."""
     from matplotlib.patches import RegularPolygon
 
-    color, dashes, corners, filled, _ = _LOOKS[effect]
+    dashes, corners, filled, _ = _LOOKS[effect]
     tip = route[-1]
     body = route[abs(route - tip) >= _MARK] if corners else route
-    axes.plot(body.real, body.imag, color=color, linestyle=dashes, linewidth=1.3, snap=False, gid=gid)
+    axes.plot(body.real, body.imag, color=_INK, linestyle=dashes, linewidth=1.1, snap=False, gid=gid)
     if corners:
         forward = _unit(tip - body[-1])
         middle = tip - _MARK * forward
-        look = {"facecolor": color if filled else "white", "edgecolor": color, "linewidth": 1.2, "zorder": 3}
+        look = {"facecolor": _INK if filled else "white", "edgecolor": _INK, "linewidth": 1.2, "zorder": 3}
         turn = float(np.angle(forward)) - np.pi / 2.0
         axes.add_patch(RegularPolygon((middle.real, middle.imag), corners, radius=_MARK, orientation=turn, **look))
 
@@ -335,7 +361,7 @@ def _draw_ends(axes: Axes, network: Network, places: dict[str, complex], routes:
         rim, outer = places[neuron] + _RADIUS * away, places[neuron] + (_RADIUS + _STUB) * away
         tail, head = (rim, outer) if upwards > 0 else (outer, rim)
         axes.plot([rim.real, outer.real], [rim.imag, outer.imag], linewidth=0.0)
-        arrow = {"arrowstyle": "-|>", "color": _ARROW, "shrinkA": 0.0, "shrinkB": 0.0}
+        arrow = {"arrowstyle": "-|>", "color": _INK, "shrinkA": 0.0, "shrinkB": 0.0}
         axes.annotate("", (head.real, head.imag), (tail.real, tail.imag), arrowprops=arrow)
         if name != neuron:
             across = "center" if abs(away.real) < 0.3 else "left" if away.real > 0 else "right"
@@ -346,49 +372,47 @@ def _draw_ends(axes: Axes, network: Network, places: dict[str, complex], routes:
 
 
 def _draw_neurons(axes: Axes, network: Network, places: dict[str, complex], unit_in: float) -> None:
-    """Draws circles, with a double rim for gated channels, and their labels."""
+    """Draws circles in the colours of the neurons, with a double rim for gated channels, and their labels."""
     from matplotlib.patches import Circle
 
-    labels = labels_of(network)
+    labels, looks = labels_of(network), looks_of(network)
     for number, (name, place) in enumerate(places.items()):
-        neuron, center = network.neurons[name], (place.real, place.imag)
-        radii = (_RADIUS, 0.84 * _RADIUS) if neuron.channels else (_RADIUS,)
-        for radius, width, face in zip(radii, (1.3, 0.8), ("white", "none"), strict=False):
+        neuron, center, color = network.neurons[name], (place.real, place.imag), looks[labels[name]]["color"]
+        radii = (_RADIUS, 0.82 * _RADIUS) if neuron.channels else (_RADIUS,)
+        for radius, width, face in zip(radii, (2.2, 1.2), ("white", "none"), strict=False):
             gid = f"neuron-{number}" if radius == _RADIUS else None
-            look = {"facecolor": face, "edgecolor": "black", "linewidth": width, "zorder": 4, "gid": gid}
+            look = {"facecolor": face, "edgecolor": color, "linewidth": width, "zorder": 4, "gid": gid}
             axes.add_patch(Circle(center, radius, **look))
         size = min(9.0, 1.5 * _RADIUS * unit_in * 72.0 / (0.6 * max(len(labels[name]), 1)))
         axes.text(*center, plain(labels[name]), ha="center", va="center_baseline", fontsize=size, zorder=5)
 
 
-def _draw_key(figure: Figure, network: Network) -> None:
-    """Writes below the network what its symbols mean, of those that it has, and what its labels stand for."""
+def _draw_key(figure: Figure, network: Network, traces: Iterable[str]) -> None:
+    """Writes below the network what its symbols mean, of those that it has, and which neurons its labels stand for.
+
+    The labels of traces are named, too, where they stand for themselves.
+    """
     from matplotlib.lines import Line2D
 
-    neurons = network.neurons.values()
-    ring: dict[str, Any] = {
-        "linestyle": "none",
-        "markeredgecolor": "black",
-        "markerfacecolor": "white",
-        "markersize": 11,
-    }
-    entries = [Line2D([], [], marker="o", label="neuron", **ring)]
-    if any(neuron.channels for neuron in neurons):
-        entries.append(Line2D([], [], marker="$\u25ce$", label="neuron with gated channels", **ring))
+    meanings, traces = meanings_of(network), set(traces)
+    ring: dict[str, Any] = {"marker": "o", "markerfacecolor": "white", "markersize": 9, "markeredgewidth": 2}
+    entries = []
+    for label, look in looks_of(network).items():
+        if label in meanings or label in traces:
+            line = look if label in traces else {"linestyle": "none", "markeredgecolor": look["color"]}
+            name = f"{label}: {meanings[label]}" if label in meanings else label
+            entries.append(Line2D([], [], label=plain(name), **ring, **line))
+    if any(neuron.channels for neuron in network.neurons.values()):
+        gated = {"marker": "$\u25ce$", "markersize": 11, "color": _INK, "linestyle": "none"}
+        entries.append(Line2D([], [], label="neuron with gated channels", **gated))
     found = {effect_of(network, link) for link in network.connections}
-    for effect, (color, dashes, _, filled, marker) in _LOOKS.items():
+    for effect, (dashes, _, filled, marker) in _LOOKS.items():
         if effect in found:
-            look = {"color": color, "linestyle": dashes, "marker": marker, "markevery": [1]}
+            look = {"color": _INK, "linestyle": dashes, "marker": marker, "markevery": [1]}
             name = effect if "gap" in effect else f"{effect} synapse"
-            entries.append(Line2D([], [], markerfacecolor=color if filled else "white", label=name, **look))
+            entries.append(Line2D([], [], markerfacecolor=_INK if filled else "white", label=name, **look))
     if network.inputs or network.outputs:
-        entries.append(Line2D([], [], color=_ARROW, marker=">", markevery=[1], label="input current, output potential"))
-    title = ",  ".join(meanings_of(network))
-    figure.legend(
-        handles=entries,
-        loc="upper left",
-        bbox_to_anchor=(0.0, 0.0),
-        ncols=3,
-        title=plain(title),
-        alignment="left",
-    )
+        entries.append(Line2D([], [], color=_INK, marker=">", markevery=[1], label="input current, output potential"))
+    legend = figure.legend(handles=entries, loc="outside lower left", ncols=3, handlelength=2.8)
+    # The key takes no room from what is above it.
+    figure.set_figheight(figure.get_figheight() + legend.get_window_extent().height / figure.dpi)

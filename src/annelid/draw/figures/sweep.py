@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 COLORS, SIGNED = "viridis", "RdBu"
 """Colours of numbers, and of such as lie on both sides of zero: white is zero, blue is positive, so forwards."""
 _PANEL_IN = (3.7, 2.6)
-_LETTERS = {"title": 42, "axis": 30}
+_LETTERS = 36
 _FAILED: Any = {"color": "0.6", "markersize": 5.0}
 _MOST_TICKS = 8
 _MOST_WRITTEN = 6  # cells of a row or a column whose numbers fit into them
@@ -74,7 +74,7 @@ def _line(axes: Axes, data: xr.Dataset, field: str, name: str) -> None:
     if several:
         axes.legend(loc="best", fontsize=7.0)
     mark_lost(axes, x[np.isnan(y).any(axis=1)], _FAILED["color"], 0.03)
-    axes.set_ylabel(_quantity(values, "axis"))
+    axes.set_ylabel(_quantity(values))
 
 
 def _map(figure: Figure, axes: Axes, data: xr.Dataset, fields: Sequence[str], name: str) -> None:
@@ -104,16 +104,17 @@ def _map(figure: Figure, axes: Axes, data: xr.Dataset, fields: Sequence[str], na
         axes.plot(x[~known], y[~known], "x", **_FAILED)
     axes.grid(visible=False)
     figure.colorbar(shown, ax=axes, pad=0.02)
-    axes.set_title(plain(_quantity(values, "title")), pad=5.0)
+    axes.set_title(plain(_quantity(values)), pad=5.0)
 
 
 def _colors(values: np.ndarray) -> dict[str, Any]:
-    """The map of colours of numbers, and its range where they lie on both sides of zero."""
+    """The map of colours of numbers, and that its middle is zero where they lie on both sides of it."""
+    from matplotlib.colors import CenteredNorm
+
     known = values[np.isfinite(values)]
     if not known.size or known.min() >= 0.0 or known.max() <= 0.0:
         return {"cmap": COLORS}
-    reach = float(np.abs(known).max())
-    return {"cmap": SIGNED, "vmin": -reach, "vmax": reach}
+    return {"cmap": SIGNED, "norm": CenteredNorm()}
 
 
 def _places(axes: Axes, which: str, coordinate: xr.DataArray) -> np.ndarray:
@@ -132,11 +133,9 @@ def _is_number(coordinate: xr.DataArray) -> bool:
     return coordinate.dtype.kind in "if"
 
 
-def _quantity(values: xr.DataArray, where: str) -> str:
-    """Writes what numbers are, in words where their dataset has them, with their unit; in lines that fit there."""
-    unit, words = values.attrs["units"], values.attrs.get("long_name")
-    text = worded(str(values.name), unit) if words is None else f"{words}{'' if unit == '1' else f' ({unit})'}"
-    return "\n".join(wrap(text, _LETTERS[where]))
+def _quantity(values: xr.DataArray) -> str:
+    """Writes what numbers are called, with their unit, and what they are the mean of; in lines that fit there."""
+    return "\n".join(wrap(worded(str(values.name), values.attrs["units"]) + values.attrs.get("of", ""), _LETTERS))
 
 
 def _label(coordinate: xr.DataArray) -> str:

@@ -90,10 +90,6 @@ def read_start(outcome: Outcome) -> Start:
     return Start(run.data["time"].values, ring[:, :n_rings].sum(axis=1), velocity_limit(run.config))
 
 
-Starts = Mapping[Worm, Mapping[float, Start]]
-"""Beginnings of a contraction by worm and step, ms."""
-
-
 def _examine(store: Store, effort: Effort) -> Findings:
     readings = design.read(_points(effort), store)
     walks = [one for one in readings if one.walk]

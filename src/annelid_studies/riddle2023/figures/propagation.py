@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from annelid.draw import WIDTH_IN, canvas, panel_title, picture_axes, save_both
+from annelid.draw import POINTS_PER_SIDE, WIDTH_IN, canvas, panel_title, picture_axes, save_both
 from annelid.morphology import Array, MeshGeometry
 from annelid.simulation import Run
 from annelid_studies.riddle2023.figures.renderings import (
@@ -114,7 +114,7 @@ def figure_8_propagation(run: Run, stem: Path, time_s: float = TIME_S) -> str:
     with canvas(6.7) as figure:
         grid = figure.add_gridspec(2, 1)
         picture, below = figure.add_subfigure(grid[0]).subplots(), figure.add_subfigure(grid[1])
-        place = show_worm(picture, posture, FIGURE_8_DEG, WIDTH_IN)
+        place = show_worm(picture, posture, FIGURE_8_DEG)
         heights_in = min(_height_over_width(picture) * WIDTH_IN + 0.9, 4.3), 2.5
         grid.set_height_ratios(heights_in)
         figure.set_figheight(sum(heights_in))
@@ -163,8 +163,7 @@ def _pin_remark(posture: Posture, segment: int) -> str:
     """A sentence where the contracted ring's pins part from their strands, as soft crossings do."""
     geometry = posture.geometry
     ring = geometry.rings[segment]
-    vertex = geometry.crossing_vertex[geometry.ring_planes[segment]]
-    strands = posture.strands_m[geometry.crossing_strands[ring], vertex]
+    strands = posture.strands_m[geometry.crossing_strands[ring], POINTS_PER_SIDE * (geometry.ring_planes[segment] + 1)]
     gap_m = float(np.linalg.norm(strands - posture.crossings_m[ring, None], axis=-1).mean())
     if gap_m < _GAP_M:
         return ""

@@ -1,4 +1,4 @@
-"""The worm in one posture, rendered on a figure's axes, and figure 4: the model at rest."""
+"""The worm in one posture, drawn on a figure's axes, and figure 4: the model at rest."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike
 
@@ -18,27 +19,34 @@ from annelid.config import RunConfig
 from annelid.draw import (
     CONTRACTED,
     PIN_RGBA,
+    POINTS_PER_SIDE,
+    SPRING_RGBA,
     STRAND_RGBA,
     VIEWS_DEG,
     Skeleton,
+    activation_color,
     canvas,
-    find_backend,
+    fitting_distance,
     panel_title,
+    picture_axes,
+    picture_points,
     postures_of,
-    render_still,
     save_both,
+    strand_curves,
 )
-from annelid.errors import RenderingUnavailable
 from annelid.morphology import Array, MeshGeometry
 from annelid.simulation import Run, compile_worm
 from annelid_studies.riddle2023.words import caption
 
 Place = Callable[[ArrayLike], Array]
-"""From points in space, m, shape ``(..., 3)``, to the axes' coordinates, shape ``(..., 2)``."""
+"""From points in space, m, shape ``(..., 3)``, to the axes' coordinates, m, shape ``(..., 2)``."""
 
 AXIAL_DEG = (0.0, 0.0)
 ISOMETRIC_DEG = VIEWS_DEG["isometric"]
-_PIXELS_PER_INCH = 220
+_DOT_M = 1e-3
+"""Half the length of the line whose round ends make a pin."""
+_PALEST = 0.6
+"""How far the colour of what is farthest away lies towards white."""
 
 
 @dataclass(frozen=True)
@@ -49,8 +57,7 @@ class Posture:
     geometry: MeshGeometry  # Its mesh at rest
     time_s: float  # Time of the posture; NaN at rest
     crossings_m: Array  # Positions of the pins, m, shape ``(n_crossings, 3)``
-    strands_m: Array  # Points of the strands, m, shape ``(n_strands, n_vertices, 3)``
-    qpos: Array | None = None  # The engine's coordinates; None at rest
+    strands_m: Array  # Points of the strands' curves, m, shape ``(n_strands, n_points, 3)``
     activation: Array | None = None  # Of every ring muscle; None where all are to be shown in red
 
 
@@ -61,7 +68,9 @@ def rest_posture(config: RunConfig) -> Posture:
         ConfigError: The worm is planar.
     """
     geometry = _mesh(config)
-    return Posture(config, geometry, float("nan"), geometry.crossings_m, geometry.vertices_m)
+    return Posture(
+        config, geometry, float("nan"), geometry.crossings_m, strand_curves(geometry.vertices_m, geometry)[0]
+    )
 
 
 def recorded_posture(run: Run, time_s: float) -> Posture:
@@ -81,7 +90,6 @@ def recorded_posture(run: Run, time_s: float) -> Posture:
         time_s=recorded_s,
         crossings_m=run.data["crossing_position"].values[frame],
         strands_m=Skeleton(anatomy).locate(qpos)[0],
-        qpos=qpos,
         activation=run.data["activation"].sel(time=recorded_s, method="nearest").values,
     )
 
@@ -90,29 +98,44 @@ def _mesh(config: RunConfig) -> MeshGeometry:
     return worm_of(config).geometry()
 
 
-def rendering_works() -> bool:
-    """Whether pictures of the worm can be rendered on this machine."""
-    try:
-        find_backend()
-    except RenderingUnavailable:
-        return False
-    return True
+def show_worm(axes: Axes, posture: Posture, angles_deg: tuple[float, float]) -> Place:
+    """Draws a posture on empty axes, what lies behind paler.
 
-
-def show_worm(axes: Axes, posture: Posture, angles_deg: tuple[float, float], width_in: float) -> Place:
-    """Shows a posture on empty axes, rendered with OpenGL.
-
-    The angles are azimuth and elevation of the line of sight; the width of the axes, inches, decides the resolution.
+    The angles are azimuth and elevation of the line of sight.
     """
+    geometry, crossings, active = posture.geometry, posture.crossings_m, posture.activation
+    rings = crossings[np.concatenate([geometry.rings, geometry.rings[:, :1]], axis=1)]
+    shares = np.ones(len(rings)) if active is None else active.reshape(len(rings), -1).mean(axis=1)
+    right, _, sight = picture_axes(*angles_deg)
+    # Lines, ``(n_lines, n_points, 3)``, with their colour and their width in points.
+    parts: list[tuple[Array, Any, float]] = [
+        (np.stack([crossings - _DOT_M * right, crossings + _DOT_M * right], axis=1), PIN_RGBA[:3], 4.0),
+        (crossings[geometry.springs], CONTRACTED if active is None else SPRING_RGBA[:3], 1.0),
+    ]
+    for strands, rgba in zip(np.split(posture.strands_m, 2), STRAND_RGBA, strict=True):
+        parts.append((strands, rgba[:3], 1.7))
+    for ring, share in zip(rings, shares.tolist(), strict=True):
+        parts.append((ring[None], activation_color(share), 1.6 + 1.4 * share))
+    pieces = [np.stack([lines[:, :-1], lines[:, 1:]], axis=2).reshape(-1, 2, 3) for lines, _, _ in parts]
+    counts, ends = [len(piece) for piece in pieces], np.concatenate(pieces)
+    target = (ends.max(axis=(0, 1)) + ends.min(axis=(0, 1))) / 2
+    distance = fitting_distance(ends.reshape(-1, 3) - target, *angles_deg, 1.0)
+
+    def place(points_m: ArrayLike) -> Array:
+        return picture_points(points_m - target, *angles_deg, distance, 1.0) * [1.0, -1.0]
+
+    depth = ends.mean(axis=1) @ sight
+    order = np.argsort(-depth)
+    pale = _PALEST * (depth - depth.min())[:, None] / np.ptp(depth)
+    colors = np.repeat([color for _, color, _ in parts], counts, axis=0) * (1.0 - pale) + pale
+    widths = np.repeat([width for *_, width in parts], counts)
+    axes.add_collection(
+        LineCollection(list(place(ends[order])), colors=colors[order], linewidths=widths[order], capstyle="round")
+    )
     axes.set_axis_off()
     axes.set_aspect("equal")
-    side = int(width_in * _PIXELS_PER_INCH)
-    still = render_still(posture.config, angles_deg, (side, side), qpos=posture.qpos, activation=posture.activation)
-    axes.imshow(still.pixels)
-    rows, columns = np.nonzero((still.pixels < 250).any(axis=-1))
-    axes.set_xlim(columns.min() - 4, columns.max() + 4)
-    axes.set_ylim(rows.max() + 4, rows.min() - 4)
-    return still.places
+    axes.autoscale_view()
+    return place
 
 
 def rhombus_outline(posture: Posture, rhombus: int) -> Array:
@@ -122,7 +145,7 @@ def rhombus_outline(posture: Posture, rhombus: int) -> Array:
     for start, end in zip(corners, np.roll(corners, -1), strict=True):
         # The points of the strand that both share, from the one pin to just before the other.
         (strand,) = np.intersect1d(geometry.crossing_strands[start], geometry.crossing_strands[end])
-        first, last = (int(geometry.crossing_vertex[geometry.crossing_plane[c]]) for c in (start, end))
+        first, last = (POINTS_PER_SIDE * (int(geometry.crossing_plane[c]) + 1) for c in (start, end))
         step = 1 if last > first else -1
         points += [posture.crossings_m[[start]], posture.strands_m[strand, np.arange(first + step, last, step)]]
     return np.concatenate([*points, points[0]])
@@ -137,8 +160,8 @@ def figure_4_model(config: RunConfig, stem: Path) -> str:
     posture = rest_posture(config)
     with canvas(3.3) as figure:
         axial, isometric = figure.subplots(1, 2, width_ratios=[1.0, 1.42])
-        show_worm(axial, posture, AXIAL_DEG, 2.8)
-        show_worm(isometric, posture, ISOMETRIC_DEG, 4.2)
+        show_worm(axial, posture, AXIAL_DEG)
+        show_worm(isometric, posture, ISOMETRIC_DEG)
         panel_title(axial, "a) axial view")
         panel_title(isometric, "b) isometric view")
         style: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 5}

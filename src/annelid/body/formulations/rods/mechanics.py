@@ -69,7 +69,7 @@ class RodMechanics(Mechanics):
         """Yields the energy of ties and of rods, J."""
         if self._ties is not None:
             yield self._ties.energy_J(self.data.qpos)
-        yield self.strains.energy_J(self.data.qpos)
+        yield self.strains.energy_J()
 
     def losses_W(self) -> Iterator[tuple[float, float]]:
         """Yields what the material takes, and all that its rows and those of ties take, W."""

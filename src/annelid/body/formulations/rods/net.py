@@ -104,7 +104,7 @@ def _add_vertices(
             add_touch(point, body.strands.radius_m, contact)
             add_tie(spec, name, point.name, tie)
 
-    between = np.setdiff1d(np.arange(len(masses)), geometry.crossing_vertex).tolist()
+    between = sorted({*range(len(masses))} - {*geometry.crossing_vertex.tolist()})
     for strand in range(geometry.n_strands):
         with _built_apart(spec, vertex_name(strand, "")) as part:
             for vertex in between:

@@ -231,9 +231,9 @@ class RodStrains:
         beyond = (bend - self._bend_at_rest) * direction.conj()
         return np.stack([beyond.real, beyond.imag, twist - self._twist_at_rest], axis=-1)
 
-    def energy_J(self, qpos: Array) -> float:
-        """What the rods store in a posture, ``(nq,)``, J."""
-        bend, twist, _ = self._bent(*self._carried(qpos)[:2])
+    def energy_J(self) -> float:
+        """What the rods store in the posture last followed, J."""
+        bend, twist, _ = self._bent(self._tangent, self.director)
         bend, twist = bend - self._bend_at_rest, twist - self._twist_at_rest
         squares = self._stiffness[..., 0] * (bend.real**2 + bend.imag**2) + self._stiffness[..., 2] * twist**2
         return 0.5 * float(squares.sum())

@@ -24,7 +24,7 @@ from fill_tables import filled
 PROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 RUNTIME = [Requirement(line) for line in PROJECT["project"]["dependencies"]]
 FORMS = sorted((ROOT / ".github" / "ISSUE_TEMPLATE").glob("*.yml"))
-NOT_TRIED = {"sns", "bench", "dev"}
+NOT_TRIED = {"sns", "bench", "learn", "dev"}
 """Extras whose lowest versions CONTRIBUTING says nobody has tried."""
 CONDA = {
     "mujoco-core": {"mujoco-python"},

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import pytest
@@ -29,6 +30,14 @@ def test_what_cannot_be_ranked_is_refused_in_a_sentence(
     assert done.exit_code == 2
     assert says in done.sentence()
     assert not list(Path().glob("challenge/runs/*"))
+
+
+def test_training_names_the_line_that_installs_its_library(annelid: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "stable_baselines3", None)
+    monkeypatch.delitem(sys.modules, "annelid_studies.challenge.learning", raising=False)
+    done = annelid("study", "challenge", "--train", "1000", "--quiet")
+    assert done.exit_code == 2
+    assert "pip install 'annelid[learn]'" in done.sentence()
 
 
 @pytest.mark.slow

@@ -1,8 +1,8 @@
 """The tasks of the benchmark, frozen as data with a version, and the entrants: which run each pair of them makes.
 
-Both are TOML, ``tasks.toml`` and ``entrants.toml``; their comments describe the fields. A draw is a function of the
-version, the task's name and a seed, so that all entrants and both bodies have the same. Seeds below `FIRST_TEST_SEED`
-are for training, the others for tests.
+They are TOML: ``tasks.toml``, ``entrants.toml``, of which the comments describe the fields, and ``policy.toml``, which
+`learning.train` wrote. A draw is a function of the version, the task's name and a seed, so that all entrants and both
+bodies have the same. Seeds below `FIRST_TEST_SEED` are for training, the others for tests.
 """
 
 from __future__ import annotations
@@ -169,7 +169,7 @@ def all_tasks() -> Tasks:
 @cache
 def own_entrants() -> Mapping[str, Entrant]:
     """Reads the entrants that come with annelid."""
-    return read_entrants(_file("entrants.toml"))
+    return {**read_entrants(_file("entrants.toml")), **read_entrants(_file("policy.toml"))}
 
 
 def _file(name: str) -> Path:

@@ -199,6 +199,12 @@ def challenge_command(
         int | None,
         typer.Option(min=1, max=10000, metavar="N", help="Search the entrants' fields in N trials, and rank nothing."),
     ] = None,
+    train: Annotated[
+        int | None,
+        typer.Option(
+            min=1000, max=10**8, metavar="STEPS", help="Train a network by reinforcement learning, and rank nothing."
+        ),
+    ] = None,
     quick: Annotated[
         bool, typer.Option("--quick", help="Two tasks, three entrants, one body, two draws: under five minutes.")
     ] = False,
@@ -221,19 +227,31 @@ def challenge_command(
     With --tune it searches the fields that entrants list under `vary`, on training draws. It writes entrants.toml and
     trials.csv.
 
+    With --train it trains a network for each body on training draws (pip install 'annelid[learn]'). It writes
+    policy.toml, a file of entrants, and the learning curves policy.csv and policy.png. It takes hours.
+
     \b
     annelid study challenge --quick                             in minutes
     annelid study challenge                                     everything
     annelid study challenge mine:Controller --task slope        your own
     annelid study challenge mine.toml --with published.csv      only yours runs
     annelid study challenge mine.toml --tune 32 -o tuned        tune it first
+    annelid study challenge --train 40000 -o trained            train a network
     """
+    from annelid.experiment import study_progress
     from annelid_studies.challenge import report, tasks
     from annelid_studies.challenge.ranking import Pair, Standing, half_step_changes, pairs, standings
     from annelid_studies.challenge.scores import Score, challenge, read_scores
     from annelid_studies.challenge.tuning import Trial, write_entrants
     from annelid_studies.challenge.tuning import tune as tuned
 
+    if train is not None:
+        from annelid_studies.challenge import learning
+
+        lock(output)
+        with going_on(output, kept="checkpoints are kept"), study_progress(quiet=quiet) as progress:
+            print_results(learning.train(body or [], train, output, progress), quiet=quiet)
+        return
     if quick:
         entrants, task = entrants or [*tasks.QUICK_ENTRANTS], task or [*tasks.QUICK_TASKS]
         body, draws, half_step = body or [*tasks.QUICK_BODIES], min(draws, tasks.QUICK_DRAWS), False

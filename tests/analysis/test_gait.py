@@ -85,7 +85,7 @@ def test_slip_contact_and_costs_in_closed_form() -> None:
     assert read.cost_of_transport_net == pytest.approx(3.0 / weight, rel=2e-3)
     data["positive_work"] = data["muscle_work"] * 2.0
     assert gait(run_of(data)).cost_of_transport == pytest.approx(6.0 / weight, rel=2e-3), "a file's own sum comes first"
-    assert energy_balance(data) == Energy(), "work alone is no balance"
+    assert energy_balance(run_of(data).variables) == Energy(), "work alone is no balance"
 
 
 DUTIES = (lambda t: 1.0 + 0 * t, lambda t: (t % 2.4 < 1.2).astype(float), lambda t: 0.0 * t)
@@ -157,7 +157,7 @@ def test_the_balance_splits_what_the_books_say() -> None:
         constraint_loss=(("time",), lambda t: 1.0 * t),
         slip_loss=(("time", "segment"), columns(lambda t: 0.3 * t, lambda t: 0.3 * t, lambda t: 0.0)),
     )
-    balance = energy_balance(data)
+    balance = energy_balance(run_of(data).variables)
     assert balance.energy_muscle_work_J == pytest.approx(36.0)
     parts = ("kinetic", "elastic", "potential", "slip", "constraints", "damping", "numerical")
     read = [getattr(balance, f"energy_{part}_J") for part in parts]
@@ -174,7 +174,7 @@ def test_a_planar_worm_s_balance_needs_no_weight() -> None:
         elastic_energy=(("time",), lambda t: 1.0 * t),
         damping_loss=(("time",), lambda t: 2.0 * t),
     )
-    balance = energy_balance(data)
+    balance = energy_balance(run_of(data).variables)
     assert (balance.energy_potential_J, balance.energy_slip_J, balance.energy_constraints_J) == (None, None, None)
     assert balance.energy_numerical_J == pytest.approx(0.0, abs=1e-12)
 

@@ -28,6 +28,7 @@ from annelid_lab.calibration.report import Identified, identify, tables, write_i
 from annelid_lab.calibration.simulations import Simulations
 from annelid_lab.calibration.study import ROBOT, load_identify_study
 from annelid_lab.logs.agreement import run_series
+from outcome import Command
 
 TUBE: dict[str, Any] = {
     "kind": "tensile",
@@ -364,3 +365,17 @@ def test_synthetic_robots_are_identified_blind(tmp_path: Path) -> None:
     numbers = [[float(cell) for cell in row.split(",")[2:]] for row in rows]
     inside = [low <= truth <= high for truth, _, low, high, *_ in numbers]
     assert np.mean(inside) >= 0.8
+
+
+@pytest.mark.parametrize("example", ["walk", "robot"])
+def test_an_example_comes_with_its_data_and_replaces_none(annelid: Command, example: str) -> None:
+    done = annelid("calibrate", "--example", example, "-o", "new/folder")
+    assert done.exit_code == 0, done.err
+    folder = Path("new/folder")
+    study = load_identify_study(folder / "study.toml")
+    assert all(len(one.read(folder).at) >= 8 for one in study.experiments)
+    data = next(path for path in folder.iterdir() if path.suffix == ".csv")
+    (folder / "study.toml").unlink()
+    data.write_text("mine")
+    assert annelid("calibrate", "--example", example, "-o", "new/folder").exit_code == 2
+    assert data.read_text() == "mine"

@@ -11,7 +11,7 @@ import pytest
 
 from annelid.body import build_spec, compile_spec
 from annelid.config import RunConfig, load_config
-from annelid.simulation.worm import WormPlant
+from annelid.simulation.worm import WormPlant, compile_worm
 
 CHAIN = {
     "body.formulation.kind": "chain",
@@ -148,3 +148,15 @@ def test_contact_sensors_change_nothing_in_the_motion() -> None:
     mujoco.mj_step(plain, data, 10)
     assert np.array_equal(plant.data.qpos, data.qpos)
     assert plant.model.nsensor > plain.nsensor
+
+
+def test_lengths_are_the_distances_along_springs_and_rings() -> None:
+    part = compile_worm(config())
+    crossing = np.random.default_rng(1).normal(size=(part.geometry.n_crossings, 3))
+    posture = part.posture(crossing, np.zeros(3), np.zeros((0, 3)), np.zeros((0, 3)))
+    first, second = crossing[part.geometry.springs].transpose(1, 0, 2)
+    assert posture.spring_length == pytest.approx(np.linalg.norm(second - first, axis=1))
+    assert posture.stretch == pytest.approx(posture.spring_length[part.geometry.sensor_springs])
+    for ring, length in zip(part.geometry.rings, posture.ring_length, strict=True):
+        corners = crossing[[*ring, ring[0]]]
+        assert length == pytest.approx(np.linalg.norm(np.diff(corners, axis=0), axis=1).sum())

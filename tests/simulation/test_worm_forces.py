@@ -102,3 +102,13 @@ def test_rest_lengths_of_the_sensors_do_not_depend_on_the_kind_of_spring() -> No
     felt = slack.reset(0)
     assert felt.rest_stretch_m == pytest.approx(slack.geometry.spring_length_m[slack.geometry.sensor_springs])
     assert felt.stretch_m == pytest.approx(felt.rest_stretch_m)
+
+
+def test_the_kinetic_energy_of_rods_is_that_of_their_vertices() -> None:
+    plant = after(worm(), 0.05)
+    slides = plant.model.jnt_type == mujoco.mjtJoint.mjJNT_SLIDE
+    dofs = plant.model.jnt_dofadr[slides]
+    mass = plant.model.body_mass[plant.model.jnt_bodyid[slides]]
+    expected = 0.5 * float(mass @ plant.data.qvel[dofs] ** 2)
+    assert plant.read(False)["kinetic_energy"] == pytest.approx(expected, rel=1e-3)
+    assert expected > 1e-4

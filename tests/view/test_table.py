@@ -112,8 +112,9 @@ def test_what_only_records_or_names_is_no_change() -> None:
 
 def test_a_run_that_was_cut_short_and_other_worms_claim_nothing() -> None:
     assert "reproduces" not in closing_sentence(replace(formulation(), status="interrupted"), FAST)
-    assert "reproduces" not in closing_sentence(formulation(), FAST, "a function from Python")
-    assert not any(row.reference for row in summary_rows(formulation(), FAST, "a function from Python"))
+    other = replace(formulation(), controller="a function from Python")
+    assert "reproduces" not in closing_sentence(other, FAST)
+    assert not any(row.reference for row in summary_rows(other, FAST))
     stopped = replace(formulation(), status="stopped_by_guard")
     assert closing_sentence(stopped, FAST) == "stopped by guard after 5 s"
     assert [row.ours for row in summary_rows(stopped, FAST) if row.label == "warnings"] == ["stopped by guard"]

@@ -43,6 +43,9 @@ class Summary(Rhythm, Elongation, Muscles, Travel, Mesh, Gait, Energy):
     duration_s: float | None = number("simulated time in the file", "simulated time", "s")
     real_time_factor: float | None = number("simulated time over wall-clock time", "times real time")
     warnings: tuple[str, ...] = number("what is doubtful about the run, a sentence each", in_sweeps=False, default=())
+    controller: str | None = number(
+        "name of the controller in the run file: one from Python may replace the configured one", in_sweeps=False
+    )
 
     def __post_init__(self) -> None:
         """Takes the warnings as JSON has them, too."""
@@ -84,6 +87,7 @@ def summary(run: Run) -> Summary:
         duration_s=finite(np.ptp(data["time"].values)) if data["time"].values.size else None,
         real_time_factor=finite(run.real_time_factor),
         warnings=run.warnings,
+        controller=run.attrs.get("controller"),
         **{name: value for section in sections for name, value in vars(section).items()},
     )
 

@@ -317,13 +317,10 @@ def print_run(run: Run, *, everything: bool = False, quiet: bool = False, check:
     checked = {} if check is None else {"check.json": check.to_dict()}
     if give_files([run.path], {run.path.name: numbers.to_dict(), **checked}) or quiet:
         return
-    moved, controller = None if check is None else check.cell, run.attrs.get("controller")
-    lines = [
-        summary_table(numbers, run.config, controller, everything=everything, moved=moved),
-        legend(run.config, controller),
-    ]
+    moved = None if check is None else check.cell
+    lines = [summary_table(numbers, run.config, everything=everything, moved=moved), legend(numbers, run.config)]
     lines += [f"warning: {doubt}" for doubt in run.warnings]
-    lines += [closing_sentence(numbers, run.config, controller), "" if check is None else check.sentence]
+    lines += [closing_sentence(numbers, run.config), "" if check is None else check.sentence]
     if not everything:
         folder = shlex.quote(str(run.path.parent))
         duration_s = duration_for_a_speed(numbers)

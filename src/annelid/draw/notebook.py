@@ -146,19 +146,15 @@ def _still(run: Run) -> str:
 
 
 def _numbers(run: Run) -> str:
-    numbers, controller = summary(run), run.data.attrs.get("controller")
-    beside = legend(run.config, controller)
+    numbers = summary(run)
+    beside = legend(numbers, run.config)
     header = ("quantity", "this run", *(COMPARED if beside else ()))
-    rows = summary_rows(numbers, run.config, controller)
+    rows = summary_rows(numbers, run.config)
     lines = "".join(
         f"<tr>{''.join(f'<td {_LEFT}>{_words(cell)}</td>' for cell in row[: len(header)])}</tr>" for row in rows
     )
     head = "".join(f"<th {_LEFT}>{_words(name)}</th>" for name in header)
-    below = [
-        beside,
-        closing_sentence(numbers, run.config, controller),
-        *(f"warning: {doubt}" for doubt in run.warnings),
-    ]
+    below = [beside, closing_sentence(numbers, run.config), *(f"warning: {doubt}" for doubt in run.warnings)]
     return f"<table><thead><tr>{head}</tr></thead><tbody>{lines}</tbody></table>{''.join(map(_paragraph, below))}"
 
 

@@ -169,7 +169,7 @@ def _name_level(axes: Axes, level: float, text: str) -> None:
 
 def _published_levels(run: Run) -> list[float]:
     """Where each segment's published elongation ends, cm: above the lowest length where it is peak to peak, or rest."""
-    beside = published(run.config, run.data.attrs.get("controller"))
+    beside = published(run.config, run.attrs.get("controller"))
     changed = set(changed_fields(run.config)[1]).difference(RESOLUTION) if beside else set()
     if any(field.startswith(("body.", "controller.")) for field in changed):
         return []  # Of another worm they would be read as what it must reach.

@@ -86,7 +86,6 @@ def aligned(rows: Sequence[Sequence[str]]) -> str:
 def summary_table(
     numbers: Summary,
     config: RunConfig,
-    controller: str | None = None,
     *,
     everything: bool = False,
     moved: Callable[[str], str] | None = None,
@@ -96,30 +95,26 @@ def summary_table(
     Args:
         numbers: The numbers.
         config: Configuration of the run.
-        controller: What the run file calls the controller, since one from Python may replace the configured one.
         everything: All rows; else those of `FIRST`.
         moved: Says how far a number, named as in `NUMBERS`, moves in finer runs; it adds a column.
     """
-    headings = ["", "this run", MOVED, *(COMPARED if references(config, controller) else ())]
+    headings = ["", "this run", MOVED, *(COMPARED if references(config, numbers.controller) else ())]
     lines = [headings]
-    for name, (label, ours, *beside) in _rows(numbers, config, controller, everything=everything).items():
+    for name, (label, ours, *beside) in _rows(numbers, config, everything=everything).items():
         further = "" if moved is None or getattr(numbers, name, None) is None else moved(name)
         lines.append([label, ours, further, *beside])
     return aligned(lines if moved is not None else [[*line[:2], *line[3:]] for line in lines])
 
 
-def summary_rows(
-    numbers: Summary, config: RunConfig, controller: str | None = None, *, everything: bool = False
-) -> list[Row]:
+def summary_rows(numbers: Summary, config: RunConfig, *, everything: bool = False) -> list[Row]:
     """Returns the rows of a run's table in which there is a number, ours or one to compare with.
 
     Args:
         numbers: The numbers.
         config: Configuration of the run.
-        controller: As of `summary_table`.
         everything: All rows; else those of `FIRST`.
     """
-    return list(_rows(numbers, config, controller, everything=everything).values())
+    return list(_rows(numbers, config, everything=everything).values())
 
 
 def explained(row: str) -> list[tuple[str, str, str]]:
@@ -142,9 +137,9 @@ def explained(row: str) -> list[tuple[str, str, str]]:
     return found
 
 
-def _rows(numbers: Summary, config: RunConfig, controller: str | None, *, everything: bool) -> dict[str, Row]:
+def _rows(numbers: Summary, config: RunConfig, *, everything: bool) -> dict[str, Row]:
     """Rows by the name of their number; those without any number are left out."""
-    beside = references(config, controller)
+    beside = references(config, numbers.controller)
     ended_early = "" if numbers.status == "complete" else numbers.status.replace("_", " ")
     doubts = ended_early, f"{len(numbers.warnings)}, below" if numbers.warnings else ""
     cells = {
@@ -307,9 +302,9 @@ def _deviation(name: str, numbers: Summary, entry: Published | None) -> str:
     return f"{_signed(100 * max(shares, key=abs))} %" if shares else ""
 
 
-def legend(config: RunConfig, controller: str | None = None) -> str:
+def legend(numbers: Summary, config: RunConfig) -> str:
     """Says where the numbers to compare with come from; empty where there are none."""
-    beside = references(config, controller)
+    beside = references(config, numbers.controller)
     if not beside:
         return ""
     places = dict.fromkeys(entry.place for entry in beside.values() if entry.paper != FORMULATION)
@@ -317,20 +312,20 @@ def legend(config: RunConfig, controller: str | None = None) -> str:
     others = [place for place in places if not place.startswith("section ")]
     where = ", ".join([*others, *([f"section{'s' * (len(sections) > 1)} {listed(sections)}"] if sections else [])])
     paper = next(entry.paper for entry in beside.values() if entry.paper != FORMULATION)
-    ours = f"; *: run of {FORMULATION}" if stands_for_the_papers(config, controller) else ""
+    ours = f"; *: run of {FORMULATION}" if stands_for_the_papers(config, numbers.controller) else ""
     return f"reference: {paper}, {where}{ours}"
 
 
-def closing_sentence(numbers: Summary, config: RunConfig, controller: str | None = None) -> str:
+def closing_sentence(numbers: Summary, config: RunConfig) -> str:
     """Says in a sentence what a run shows: how it stands to its references, or how its segments contract."""
     if numbers.status != "complete":
         return f"{numbers.status.replace('_', ' ')} after {three_digits(numbers.duration_s or 0.0)} s"
-    if not references(config, controller):
+    if not references(config, numbers.controller):
         return _about_the_rhythm(numbers)
     preset, changed = changed_fields(config)
     if changed:
         return f"differs from {preset} in {listed(changed)}; references are of the unchanged worm"
-    if not stands_for_the_papers(config, controller):
+    if not stands_for_the_papers(config, numbers.controller):
         return _about_the_rhythm(numbers)
     if config.body.has_rigid_crossings:
         return _about_rigid_crossings(numbers)

@@ -59,12 +59,12 @@ def _head(run: Run) -> str:
 
 
 def _numbers(run: Run) -> list[str]:
-    numbers, controller = summary(run), run.data.attrs.get("controller")
-    rows = summary_rows(numbers, run.config, controller, everything=True)
-    beside = legend(run.config, controller)
+    numbers = summary(run)
+    rows = summary_rows(numbers, run.config, everything=True)
+    beside = legend(numbers, run.config)
     header = ["quantity", "this run", *(COMPARED if beside else ())]
     cells = [[words(word) for word in row[: len(header)]] for row in rows]
-    below = [beside, closing_sentence(numbers, run.config, controller)]
+    below = [beside, closing_sentence(numbers, run.config)]
     return ["## Numbers", table(header, cells), *(words(text) for text in below if text)]
 
 

@@ -35,9 +35,8 @@ LAST, SMOOTH = 4, 0.3
 """Worms in the last region, of the terms of the emulator; few are enough where they scatter less, in standard
 deviations of the residuals."""
 MOST_REGIONS = 8
-RIVAL_START, RIVAL = 1.5, 1.2
-"""Rms over the best one of a far worm of the first region from which another optimum is looked for, and of an optimum
-that is reported."""
+RIVAL = 1.2
+"""Rms of another optimum over that of the best one, below which it is reported."""
 ROUNDS = 3
 """Estimates of the errors, each followed by a fit."""
 SINGULAR = 1e-12
@@ -226,12 +225,12 @@ class Errors:
         """Sum of squares of a worm that was computed."""
         return float((self.rows(one.logs, self.model.measured(one)) ** 2).sum())
 
-    def minimise(self, emulator: Emulator, start: Array, low: Array, high: Array) -> tuple[Array, Array]:
-        """Returns the emulator's optimum between bounds, and the information there."""
+    def minimise(self, emulator: Emulator, start: Array, low: Array, high: Array) -> Array:
+        """Returns the emulator's optimum between bounds."""
         # Loading it takes a second, which only a fit should pay.
         from scipy.optimize import least_squares
 
-        found = least_squares(
+        return least_squares(
             lambda at: self.rows(at, emulator.predicted(at)),
             np.clip(start, low + 1e-9, high - 1e-9),
             bounds=(low, high),
@@ -240,8 +239,7 @@ class Errors:
             xtol=1e-4,
             ftol=1e-6,
             max_nfev=30,
-        )
-        return found.x, found.jac.T @ found.jac
+        ).x
 
 
 def plain(model: Model, one: Tried) -> Errors:
@@ -268,8 +266,7 @@ def fitted(study: IdentifyStudy, folder: Path, simulations: Simulations) -> tupl
         raise SimulationStopped("the worm that the fit starts from gives way: set the parameters' start otherwise")
     for one, data, found, there in zip(study.experiments, model.data, first.found, model.measured(first), strict=True):
         one.refuse_unlike(data, found, there)
-    best, emulator = _searched(model, first, FIRST)
-    return _finished(model, best, emulator, _rival(model, best)), model
+    return _finished(model, *_with_rival(model, *_searched(model, first, FIRST))), model
 
 
 def _searched(model: Model, best: Tried, first: float) -> tuple[Tried, Emulator]:
@@ -293,7 +290,7 @@ def _searched(model: Model, best: Tried, first: float) -> tuple[Tried, Emulator]
             break
         emulator = _emulator(model, centre, radius, quadratic + 2)
         errors = Errors(model, plain(model, best).noises, emulator.scatter())
-        optimum, _ = errors.minimise(emulator, best.logs, low, high)
+        optimum = errors.minimise(emulator, best.logs, low, high)
         model.run([optimum])
         best = _best(model, plain(model, best), replace(best, logs=model.with_untested(best, optimum).logs))
         share, clear, known = _goal(model, emulator, best)
@@ -310,27 +307,30 @@ def _searched(model: Model, best: Tried, first: float) -> tuple[Tried, Emulator]
     return best, _emulator(model, centre, radius, quadratic + 2)
 
 
-def _rival(model: Model, best: Tried) -> tuple[Array, float] | None:
-    """Looks for another optimum, from the best worm of the first region that no slope joins with the best one."""
+def _with_rival(model: Model, best: Tried, emulator: Emulator) -> tuple[Tried, Emulator, tuple[Array, float] | None]:
+    """Looks for another optimum, from the best worm of the first region that no slope joins with the best one.
+
+    Returns:
+        The better of both with its emulator, and the other one, if there is one that fits about as well.
+    """
     moving, errors = model.moving, plain(model, best)
     design = model.tried[: 1 + 2 * n_terms(len(moving), 2)]
     away = [np.abs(one.logs - best.logs)[moving].max(initial=0.0) > FIRST / 2 for one in design]
     far = [model.with_untested(one, best.logs) for one, is_far in zip(design, away, strict=True) if is_far]
-    near = [model.with_untested(one, best.logs) for one, is_far in zip(design, away, strict=True) if not is_far]
-    if not far or not near:
-        return None
+    if not far:
+        return best, emulator, None
     other = min(far, key=errors.misfit)
-    if errors.misfit(other) > RIVAL_START**2 * min(map(errors.misfit, near)):
-        return None
     between = model.run([(other.logs + best.logs) / 2.0])[0]
     if between is None or errors.misfit(between) < errors.misfit(other):
-        return None
+        return best, emulator, None
     kept, model.tried = model.tried, [other]
-    found, _ = _searched(model, other, FIRST * SHRINK)
-    model.tried = kept
+    found, emulator_there = _searched(model, other, FIRST * SHRINK)
     ratio = float(np.sqrt(errors.misfit(found) / errors.misfit(best)))
     is_far = np.abs(found.logs - best.logs)[moving].max() > FIRST * SHRINK
-    return (found.logs, ratio) if is_far and ratio < RIVAL else None
+    if is_far and ratio < 1.0:
+        return found, emulator_there, (best.logs, 1.0 / ratio) if 1.0 / ratio < RIVAL else None
+    model.tried = kept
+    return best, emulator, (found.logs, ratio) if is_far and ratio < RIVAL else None
 
 
 def _goal(model: Model, emulator: Emulator, best: Tried) -> tuple[float, Array, Array]:
@@ -369,7 +369,7 @@ def _finished(model: Model, best: Tried, emulator: Emulator, rival: tuple[Array,
     high = np.minimum(emulator.centre + 1.5 * emulator.radius, model.high)
     middle, noises = best.logs, errors.noises
     for _ in range(ROUNDS):
-        middle, _ = Errors(model, noises, scatter).minimise(emulator, middle, low, high)
+        middle = Errors(model, noises, scatter).minimise(emulator, middle, low, high)
         noises = _errors(_fit_of(model, emulator, best, middle, noises, scatter))
     model.run([middle, *_finish(_fit_of(model, emulator, best, middle, noises, scatter), low, high)])
     best = _best(model, Errors(model, noises), replace(best, logs=middle))

@@ -70,7 +70,8 @@ class Model:
             {path: share for field, share in one.fields.items() for path in study.paths(field)} for one in known
         ]
         self.tried: list[Tried] = []
-        self._predicted: dict[tuple[int, bytes], list[Array]] = {}
+        # What a test gave is kept with its prediction, so that no other takes its identity.
+        self._predicted: dict[tuple[int, bytes], tuple[list[Found], list[Array]]] = {}
         inward = np.where(self.start + NUDGE < self.high, NUDGE, -NUDGE)
         here = self._asked(self.start)
         there = [self._asked(self.start + inward * axis) for axis in np.eye(len(inward))]
@@ -122,8 +123,8 @@ class Model:
         """Predicts all points of a worm that was computed."""
         key = (id(one.found), one.logs.tobytes())
         if key not in self._predicted:
-            self._predicted[key] = self.predicted(one.logs, one.found)
-        return self._predicted[key]
+            self._predicted[key] = one.found, self.predicted(one.logs, one.found)
+        return self._predicted[key][1]
 
     def with_untested(self, tried: Tried, logs: Array) -> Tried:
         """Returns a worm that was computed with those parameters of another that no test depends on."""

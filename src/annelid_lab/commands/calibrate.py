@@ -76,9 +76,10 @@ def calibrate_command(
     from annelid_lab.calibration.study import EXAMPLES, ROBOT, load_identify_study
 
     if example is not None:
-        refuse_existing(output / "study.toml", force)
         output.mkdir(parents=True, exist_ok=True)
         files = dict(zip(EXAMPLES[example], ("study.toml", *EXAMPLES[example][1:]), strict=True))
+        for name in files.values():
+            refuse_existing(output / name, force)
         print_paths([copyfile(ROBOT.with_name(source), output / name) for source, name in files.items()])
         return
     source = ROBOT if study is None else study

@@ -22,9 +22,10 @@ BODIES = {
 HALF_RINGS = "riddle2025-3x1"
 WITH_ALL_SIGNALS = {
     "program": {"contractions": [{"segment": 1, "start_s": 0.0, "stop_s": 1.0}]},
+    "policy": {"hidden": [[0.0] * 9], "hidden_bias": [0.0], "output": [[0.0]] * 3, "output_bias": [0.0] * 3},
     "sns-robust": {"motor_time_constant_s": 0.35, "descending": {"lift": 0.45}},
 }
-"""What kinds of controllers must be told before they record all that they can."""
+"""What kinds of controllers must be given, or record more with."""
 
 
 def page() -> str:

@@ -26,7 +26,6 @@ WAITING: tuple[str, ...] = ()
 """Result files that do not exist yet: their tables have the numbers of earlier runs."""
 
 EXCEPTIONS = {
-    ("docs/evidence/challenge.md", "entrant"): "what was searched, not results",
     ("docs/environments.md", "numbers"): "spaces of the environment, not results: tests/environments compares them",
     ("docs/explanation/equations.md", "symbol"): "values of presets, which test_equations compares",
     ("docs/explanation/equations.md", "conductance"): "the same",

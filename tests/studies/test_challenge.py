@@ -183,6 +183,8 @@ def test_the_ranking_is_the_mean_of_ratios_over_tasks() -> None:
     overall = next(one for one in pairs(rows) if one.body == ALL)
     assert (overall.first, overall.second) == (REFERENCE, "mine")
     assert (overall.difference, overall.faster) == pytest.approx((1.0 - 1.0, 0.5))
+    by_task = {one.task: one.difference for one in pairs(rows) if one.body != ALL}
+    assert by_task == pytest.approx({ALL: 0.0, "slope": -1.0, "level": 1.0})
     assert mean_ranks(Speeds(rows))[0] == {REFERENCE: 1.5, "mine": 1.5}
 
 

@@ -61,6 +61,7 @@ class Pair:
         first: The one.
         second: The other.
         body: `ALL` for all.
+        task: `ALL` for all; single tasks have pairs with the reference only.
         difference: Mean ratio of the first less that of the second, with its 95 % interval by bootstrap.
         difference_low: Lower end.
         difference_high: Upper end.
@@ -81,6 +82,7 @@ class Pair:
     first: str
     second: str
     body: str
+    task: str
     difference: float
     difference_low: float
     difference_high: float
@@ -127,6 +129,10 @@ class Speeds:
         self.ratio: Array = self.speed_m_per_s / np.maximum(mean, LEAST_REFERENCE_M_PER_S)[:, np.newaxis]
         way_m = each("distance_m")
         self.way_m, self.slip_J, self.work_J = np.where(way_m > 0, way_m, np.nan), each("slip_J"), each("work_J")
+
+    def of(self, body: str, task: str) -> list[int]:
+        """Returns the numbers of the cells of a body and a task, or of all."""
+        return [i for i, cell in enumerate(self.cells) if body in (ALL, cell[0]) and task in (ALL, cell[1])]
 
 
 def _interval(values: Array) -> tuple[float, float, float]:
@@ -176,11 +182,10 @@ def standings(scores: Sequence[Score]) -> list[Standing]:
     at_step = [one for one in scores if one.finer == 1]
     speeds = Speeds(at_step)
     best = np.argsort(-speeds.ratio.mean(axis=(1, 2)), kind="stable").tolist()
-    groups: list[tuple[str, str]] = [(ALL, ALL), *((body, ALL) for body in dict.fromkeys(b for b, _ in speeds.cells))]
     runs = grouped(at_step, lambda one: one.entrant)
     found = []
-    for body, task in [*groups, *speeds.cells]:
-        cells = [i for i, cell in enumerate(speeds.cells) if body in (ALL, cell[0]) and task in (ALL, cell[1])]
+    for body, task in _groups(speeds):
+        cells = speeds.of(body, task)
         for i in best:
             name = speeds.entrants[i]
             own = [one for one in runs[name] if body in (ALL, one.body) and task in (ALL, one.task)]
@@ -216,30 +221,36 @@ def _per_metre(scores: Sequence[Score], energy: str) -> float:
 
 
 def pairs(scores: Sequence[Score]) -> list[Pair]:
-    """Compares every two entrants on the same draws, over all tasks and on each body."""
+    """Compares every two entrants on the same draws: over all tasks, on each body, with the reference on each task."""
     speeds = Speeds([one for one in scores if one.finer == 1])
     finer = {(one.entrant, one.body, one.task, one.seed) for one in scores if one.finer != 1}
     twice = [one for one in scores if (one.entrant, one.body, one.task, one.seed) in finer]
     coarse, fine = ([one for one in twice if (one.finer == 1) == at_step] for at_step in (True, False))
     beside = (Speeds(coarse), Speeds(fine)) if finer else None
     found = []
-    for body in (ALL, *dict.fromkeys(body for body, _ in speeds.cells)):
-        cells = [i for i, cell in enumerate(speeds.cells) if body in (ALL, cell[0])]
+    for body, task in _groups(speeds):
+        cells = speeds.of(body, task)
         for first, second in combinations(speeds.entrants, 2):
+            if task != ALL and REFERENCE not in (first, second):
+                continue
             both = [speeds.entrants.index(name) for name in (first, second)]
             one, other = speeds.ratio[both][:, cells]
             numbers = (*_interval(one - other), *_interval((one > other) + 0.5 * (one == other)))
             for energy in (speeds.slip_J, speeds.work_J):
                 numbers += _cost_ratio(energy[both][:, cells], speeds.way_m[both][:, cells])
-            steps = (nan, nan) if beside is None else [_difference(each, first, second, body) for each in beside[::-1]]
-            found.append(Pair(first, second, body, *(float(f"{number:.4g}") for number in (*numbers, *steps))))
+            steps = (nan, nan) if beside is None else [_difference(each, both, body, task) for each in beside[::-1]]
+            found.append(Pair(first, second, body, task, *(float(f"{number:.4g}") for number in (*numbers, *steps))))
     return found
 
 
-def _difference(speeds: Speeds, first: str, second: str, body: str) -> float:
-    cells = [i for i, cell in enumerate(speeds.cells) if body in (ALL, cell[0])]
-    one, other = (speeds.ratio[speeds.entrants.index(name)][cells] for name in (first, second))
-    return float((one - other).mean())
+def _groups(speeds: Speeds) -> list[tuple[str, str]]:
+    """All tasks on all bodies, then on each body, then each task on each body."""
+    return [(ALL, ALL), *((body, ALL) for body in dict.fromkeys(b for b, _ in speeds.cells)), *speeds.cells]
+
+
+def _difference(speeds: Speeds, both: Sequence[int], body: str, task: str) -> float:
+    one, other = speeds.ratio[both][:, speeds.of(body, task)]
+    return float((one - other).mean()) if one.size else nan
 
 
 def half_step_changes(scores: Sequence[Score]) -> dict[str, Array]:

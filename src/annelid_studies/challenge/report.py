@@ -126,6 +126,6 @@ def pairs_table(found: Sequence[Pair], reference: str) -> TerminalTable:
         "at half the step": lambda one: f"{one.at_half_step:+.2f}" if isfinite(one.at_half_step) else "-",
         "same draws": lambda one: f"{one.at_step:+.2f}" if isfinite(one.at_step) else "-",
     }
-    rows = [one for one in found if reference in (one.first, one.second)]
+    rows = [one for one in found if one.task == ALL and reference in (one.first, one.second)]
     caption = "difference of speeds over the reference's; faster: share of tasks and draws; slip: first over second"
     return terminal_table(tabulated(rows, columns), f"Beside {reference}", n_words=2, caption=caption)

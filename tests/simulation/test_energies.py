@@ -54,6 +54,18 @@ def test_a_falling_worm_turns_potential_into_kinetic_energy() -> None:
     assert np.abs(read["muscle_work"]).max() + abs(float(read["damping_loss"])) < 1e-9
 
 
+def test_the_work_of_a_push_is_accounted_for() -> None:
+    """Weightless, every crossing in proportion to its mass: it goes as one, by a constant force."""
+    plant = worm(0.002, **FREE, **{"arena.gravity_m_per_s2": 0.0})
+    mass = plant.model.body_mass[plant.anatomy.crossing_body]
+    plant.push(5.0 * (mass / mass.sum())[:, np.newaxis] * [0.0, 1.0, 0.0])
+    for _ in range(100):
+        plant.step(np.zeros(3))
+    given_J = (5.0 * 0.2) ** 2 / 2 / plant.total_mass_kg
+    assert -float(plant.read(False)["constraint_loss"]) == pytest.approx(given_J, rel=0.02)
+    assert remainder(plant, 0.0) == pytest.approx(0.0, abs=0.02 * given_J)
+
+
 @pytest.mark.parametrize("damping", [pytest.param(0.0, marks=pytest.mark.slow), 0.016])
 def test_a_ringing_net_keeps_its_energy_but_for_dampers_and_edges(damping: float) -> None:
     """Weightless, set moving lengthwise: what is missing shrinks with the step."""

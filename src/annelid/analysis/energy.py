@@ -25,7 +25,7 @@ class Energy:
     energy_potential_J: float | None = number("gain of the energy of the weight")
     energy_slip_J: float | None = number("lost to friction of what slides", "lost to slip", "J")
     energy_constraints_J: float | None = number(
-        "lost to contacts along their normal and to other constraints; soft contacts may give back"
+        "lost to contacts along their normal, other constraints and outside forces; soft contacts may give back"
     )
     energy_damping_J: float | None = number("lost to dampers")
     energy_numerical_J: float | None = number("what is left: lost to the integrator")

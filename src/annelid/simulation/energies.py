@@ -25,7 +25,7 @@ class EnergyTotals(NamedTuple):
     muscle_work: Array  # net work of every ring actuator on the body, (n_muscles,)
     positive_work: Array  # what each did in the physics steps in which its work was positive, likewise
     damping_loss: Array  # what dampers have taken, ()
-    constraint_loss: Array  # what contacts, their friction included, and other constraints have taken, ()
+    constraint_loss: Array  # what contacts with their friction, other constraints and outside forces have taken, ()
 
     @classmethod
     def zero(cls, n_muscles: int) -> EnergyTotals:

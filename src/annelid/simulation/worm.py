@@ -76,7 +76,7 @@ _SIGNALS = {
         "energies.constraint_loss",
         (),
         "J",
-        "energy lost to contacts, friction and inextensible edges so far",
+        "energy taken by contacts, friction, inextensible edges and pushes from outside so far",
     ),
     "object_position": ("posture.objects", ("object", "axis"), "m", "centre of mass of a body that moves in the scene"),
     "object_force": ("_encounter.force", ("object", "axis"), "N", "force of the worm on a body that moves"),
@@ -225,6 +225,10 @@ class WormPlant:
         shortening = before.ring_length - self.posture.ring_length
         self.energies = self.energies.plus(work_in_step(self._step_s, shortening, self._powers, powers))
         self._powers = powers
+        pushed_N = self.data.xfrc_applied[self.anatomy.crossing_body, :3]
+        if pushed_N.any():
+            against = -float((pushed_N * (self.posture.crossing - before.crossing)).sum())
+            self.energies = self.energies._replace(constraint_loss=self.energies.constraint_loss + against)
 
     def _prepare(self) -> None:
         """Lays the ground under the skin where the engine has it now."""
@@ -234,7 +238,7 @@ class WormPlant:
     def push(self, force_N: Array) -> None:
         """Lets outside forces, N, ``(n_crossings, 3)``, act on the crossings from the next step on; zeros end it.
 
-        They are in the model's axes, and the energy totals know nothing of their work.
+        They are in the model's axes. What is done against them counts as taken by constraints.
         """
         self.data.xfrc_applied[self.anatomy.crossing_body, :3] = force_N
 

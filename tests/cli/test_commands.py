@@ -242,7 +242,7 @@ def test_arenas_are_listed_printed_built_and_walked_in(annelid: Command) -> None
 
 
 def test_the_command_prints_findings_and_refuses(annelid: Command) -> None:
-    assert annelid("check").out.strip() == "nothing found"
+    assert annelid("check").out.strip() == "no doubts: the numbers fit together"
     assert annelid("check", "riddle2022-planar").exit_code == 0
     unstable = ("--set", "controller.kind=sns-robust", "--set", "clock.control_timestep_s=0.02")
     assert "clock.control_timestep_s = 0.02 must be at most" in annelid("check", *unstable).err, "as run says"

@@ -97,7 +97,7 @@ TASKS = {
             "annelid run small.toml -o small",
         ),
         gives=("small.toml", "small/run.nc", "small/figure7.png"),
-        prints="nothing found",
+        prints="no doubts",
     ),
     "ring force": Task(
         "docs/how_to/ring_force.md", ("annelid study load-frame --diameter-share 0.5 -o frame",), prints="2.29"

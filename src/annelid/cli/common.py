@@ -298,7 +298,9 @@ def print_worm(config: RunConfig, *, quiet: bool = False) -> None:
         typer.echo(shorten(what, WIDTH - len(size), placeholder=" ..") + size)
 
 
-def print_run(run: Run, *, everything: bool = False, quiet: bool = False, check: Check | None = None) -> None:
+def print_run(
+    run: Run, *, everything: bool = False, quiet: bool = False, check: Check | None = None, note: str = ""
+) -> None:
     """Prints the numbers of a run unless it is to be quiet, those to compare with beside them, and what follows.
 
     A check adds how far each number moves, and its sentence at the end.
@@ -308,6 +310,7 @@ def print_run(run: Run, *, everything: bool = False, quiet: bool = False, check:
         everything: All numbers; else what is asked first.
         quiet: Whether nothing is printed.
         check: What finer runs have found.
+        note: A further sentence.
     """
     from annelid.analysis import summary
     from annelid.draw.summary_table import closing_sentence, duration_for_a_speed, legend, summary_table
@@ -319,8 +322,8 @@ def print_run(run: Run, *, everything: bool = False, quiet: bool = False, check:
         return
     moved = None if check is None else check.cell
     lines = [summary_table(numbers, run.config, everything=everything, moved=moved), legend(numbers, run.config)]
-    lines += [f"warning: {doubt}" for doubt in run.warnings]
-    lines += [closing_sentence(numbers, run.config), "" if check is None else check.sentence]
+    lines += [f"warning: {doubt}" for doubt in numbers.warnings]
+    lines += [closing_sentence(numbers, run.config), "" if check is None else check.sentence, note]
     if not everything:
         folder = shlex.quote(str(run.path.parent))
         duration_s = duration_for_a_speed(numbers)

@@ -175,7 +175,8 @@ def run_command(
                 # Interrupted: the run itself may be done.
                 with suppress(RunFileError):
                     if (left := open_run(folder)).config == config:
-                        print_run(left, quiet=quiet)
+                        missing = "no error bars" if uncertainty is not None else "step and mesh are not checked"
+                        print_run(left, quiet=quiet, note=f"interrupted: {missing}, since finer runs are not done")
                         print_paths([left.path])
                 raise
             done = open_run(folder)

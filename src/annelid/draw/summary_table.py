@@ -162,10 +162,12 @@ def _rows(numbers: Summary, config: RunConfig, *, everything: bool) -> dict[str,
 def _order(numbers: Summary) -> str:
     if not numbers.order:
         return "no contraction"
+    silent = numbers.rhythm_verdict == "silent"
     if numbers.wave:
         times = f"{numbers.full_cycles} time{'' if numbers.full_cycles == 1 else 's'}"
-        return f"{_dashed(range(1, numbers.n_segments + 1))}, {times}"
-    return f"{_dashed(numbers.order)}, {'too short to judge' if numbers.wave is None else 'no wave'}"
+        return f"{_dashed(range(1, numbers.n_segments + 1))}, {times}{', then none' if silent else ''}"
+    last = "then none" if silent else "too short to judge" if numbers.wave is None else "no wave"
+    return f"{_dashed(numbers.order)}, {last}"
 
 
 def _dashed(segments: Sequence[int]) -> str:
@@ -189,6 +191,8 @@ def duration_for_a_speed(numbers: Summary) -> int | None:
     onsets_s = numbers.onsets_s
     if numbers.speed_m_per_s is not None or numbers.travel_m is None or len(onsets_s) < 2:
         return None
+    if numbers.rhythm_verdict == "silent":
+        return None
     period_s = numbers.period_s or numbers.n_segments * (onsets_s[-1] - onsets_s[0]) / (len(onsets_s) - 1)
     duration_s = ceil(onsets_s[0] + _CYCLES_FOR_A_SPEED * period_s)
     return duration_s if duration_s > onsets_s[0] + (numbers.duration_s or 0.0) else None
@@ -196,6 +200,8 @@ def duration_for_a_speed(numbers: Summary) -> int | None:
 
 def _why_no_speed(numbers: Summary) -> str:
     duration_s = duration_for_a_speed(numbers)
+    if numbers.rhythm_verdict == "silent":
+        return "none: the rhythm stops"
     return "needs two cycles" + (f", better four: --duration {duration_s}" if duration_s else "")
 
 
@@ -337,12 +343,10 @@ def closing_sentence(numbers: Summary, config: RunConfig) -> str:
 
 def _about_the_rhythm(numbers: Summary) -> str:
     reason, verdict, stride_m = numbers.rhythm_reason, numbers.rhythm_verdict, numbers.stride_m
-    if reason is None:
-        return ""
+    if reason is None or verdict == "silent":
+        return ""  # A warning says that.
     said = f"the segments contract out of order: {reason}"
-    if verdict == "silent":
-        said = f"the rhythm stops: {reason}"
-    elif numbers.wave:
+    if numbers.wave:
         said = "the segments contract one after the other from front to rear"
     elif verdict != "disordered":
         said = f"the segments contract in {reason}" if verdict else "the run is too short to judge the order"

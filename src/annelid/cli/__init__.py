@@ -43,6 +43,7 @@ from annelid.cli.entry import (
     end_study,
     lock,
     main,
+    remark,
     study,
     typed_command,
 )
@@ -90,6 +91,7 @@ __all__ = [
     "print_worm",
     "refuse_existing",
     "refuse_json",
+    "remark",
     "runs_from",
     "study",
     "typed_command",

@@ -49,6 +49,28 @@ def circuit_text(circuit: Circuit) -> str:
     return toml_text({**tables, "readout": {**_stated(circuit.readout), **start}})
 
 
+def network_values(config: RunConfig, *, senses: bool = False) -> dict[str, Any]:
+    """Returns all values of a circuit's network by what they are of, as ``synapse a to b: conductance_uS``.
+
+    With ``senses`` those of senses and readout are among them, which the text of the configuration must have.
+    """
+    kind: Any = config.controller
+    tables = network_tables(kind.circuit(config, config.body.n_segments).network)
+    if senses:
+        tables |= {name: one for name, one in parse_toml(kind.text, "the network").items() if name in CIRCUIT_TABLES}
+    values: dict[str, list[Any]] = {}
+    for table, entries in tables.items():
+        for entry in [entries] if isinstance(entries, Mapping) else entries if isinstance(entries, list) else []:
+            own, label = dict(entry), f"{table} {entry.get('name', entry.get('input', ''))}".strip()
+            if table == "connection":
+                label = f"{own.pop('kind')} {own.pop('source')} to {own.pop('target')}"
+            for field, value in own.items():
+                if field not in ("name", "input"):
+                    values.setdefault(f"{label}: {field}", []).append(value)
+    # Several connections of one kind may join the same two neurons.
+    return {name: of_all[0] if len(of_all) == 1 else of_all for name, of_all in values.items()}
+
+
 def circuit_of_text(text: str) -> Circuit:
     """Builds the circuit of a TOML text.
 

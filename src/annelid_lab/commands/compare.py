@@ -8,7 +8,19 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from annelid.cli import Force, command, complain, give, lock, play, print_paths, refuse_existing, runs_from
+from annelid.cli import (
+    Force,
+    command,
+    complain,
+    give,
+    lock,
+    play,
+    print_paths,
+    refuse_existing,
+    remark,
+    runs_from,
+    wants_json,
+)
 from annelid.errors import ConfigError, RunFileError
 
 
@@ -97,6 +109,8 @@ def compare_command(
         typer.echo(comparison_table(comparison, everything=everything))
         typer.echo(f"\n{fields_table(comparison) if comparison.fields else 'the configurations are the same'}")
     if output is None:
+        if not wants_json():
+            typer.echo("next: all numbers with --all, figures of the runs with -o FOLDER")
         return
     written = [write_json(output / "comparison.json", comparison.to_dict())]
     for name, draw in figures.items():
@@ -141,7 +155,7 @@ def _compare_measured(
     if not give(found.to_dict()):
         typer.echo(agreement_table(found))
     for note in found.notes:
-        complain(f"note: {note}")
+        remark(f"note: {note}")
     if output is not None:
         print_paths([write_json(output / "agreement.json", found.to_dict())])
         print_paths([agreement_figure(found, output / "agreement")])

@@ -121,8 +121,8 @@ def tolerance_findings(
         problem = f"a segment lengthens by at most {most:.2g} m, to straight strands: its sensor never switches off"
     elif window and low >= high:
         problem = (
-            f"no tolerance is known to keep the order: it must be above the {low:.2g} m by which neighbours lengthen "
-            f"a segment, and below the {high:.2g} m from which a relaxing segment's sensor switches on too early"
+            f"no tolerance is known to keep the order. Neighbours lengthen a segment by {low:.2g} m, which must switch "
+            f"nothing; above {high:.2g} m a relaxing segment's sensor switches on too early"
         )
         instead = "take controller.kind = sns-robust, or softer strands"
     elif tolerance > high and window:

@@ -41,7 +41,7 @@ WORDS = {
     "order": "the order in which segments contract, and how many times a wave ran from the first segment to the last",
     "onsets (s)": "the times at which segments begin to contract, in that order",
     "work goes to (%)": "what became of the muscles' net work: stored in the body, lost to slip on the ground, to "
-    "other forces of contacts, to damping, and to the error of the time step. An error below 0 adds energy",
+    "contacts otherwise, to damping, or to the error of the time step. An error below 0 adds energy",
     "warnings": "what is doubtful about the run, a sentence each",
     COMPARED[0]: f"a published number; with *: that of {FORMULATION}, our run of the paper's own formulation",
     COMPARED[1]: "difference from the reference, in percent of it; of several segments the largest",

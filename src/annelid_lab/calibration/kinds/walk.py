@@ -107,6 +107,10 @@ class Walk(Experiment):
         label = f"signals ({unit})" if one_unit else "signals over their standard deviations"
         return Data(of[0], of[1], which, ("time of the log (s)", label), unit, log.notes, samples)
 
+    def place(self, data: Data) -> Array:
+        """Share of the log's time, so that the last cycles of all signals can be held out."""
+        return data.at / float(np.ptp(data.source.log.time_s))
+
     def test(self, config: RunConfig, data: Data) -> WalkTest:
         """Returns the run to make, with the signals of the map."""
         log: Measured = data.source.log
@@ -176,8 +180,13 @@ class Walk(Experiment):
             drifts = np.array([float(log_map.clock_drift)])
         ways = [(lag, drift) for drift in drifts for lag in lags]
         free = [axis for axis, values in enumerate((lags, drifts)) if len(values) > 1]
+        kept = ~self.held(data)
+
+        def misfit(way: tuple[float, float]) -> float:
+            return float(((self._coarse(data, found, *way) - data.values)[kept] ** 2).sum())
+
         # Phases first: the whole range is searched before anything is refined.
-        best = np.array(min(ways, key=lambda way: float(((self._coarse(data, found, *way) - data.values) ** 2).sum())))
+        best = np.array(min(ways, key=misfit))
         if not free:
             return float(best[0]), float(best[1])
         size = np.array(
@@ -187,7 +196,7 @@ class Walk(Experiment):
         def off(moved: Array) -> Array:
             here = best.copy()
             here[free] += moved * size[free]
-            return (self._shifted(data, found, *here) - data.values) / np.std(data.values)
+            return (self._shifted(data, found, *here) - data.values)[kept] / np.std(data.values)
 
         low, high = np.full(len(free), -1.0), np.full(len(free), 1.0)
         moved = least_squares(off, np.zeros(len(free)), bounds=(low, high), diff_step=0.05, x_scale=1.0).x

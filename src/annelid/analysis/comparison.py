@@ -9,8 +9,7 @@ from typing import Any
 from annelid.analysis.numbers import Value
 from annelid.analysis.summary import NUMBERS, summary
 from annelid.config import RunConfig, field_value, fields_of
-from annelid.control.circuit_controller import CircuitKind
-from annelid.control.network_file import NetworkFile, network_values
+from annelid.control.network_file import differing_networks
 from annelid.simulation.runfile import Run
 
 COMPARED = tuple(name for name, one in NUMBERS.items() if one.in_sweeps and name not in ("n_segments", "wave"))
@@ -62,7 +61,7 @@ def compare(runs: Sequence[Run]) -> Comparison:
         orders=tuple(tuple(one.order) for one in summaries),
         numbers={name: tuple(getattr(one, name) for one in summaries) for name in COMPARED},
         fields=differing_fields([run.config for run in runs]),
-        network=_differing_networks([run.config for run in runs]),
+        network=differing_networks([run.config for run in runs], LACKING),
     )
 
 
@@ -98,17 +97,6 @@ def differing_fields(configs: Sequence[RunConfig]) -> dict[str, tuple[Any, ...]]
         if any(value != values[0] for value in values):
             fields[path] = values
     return fields
-
-
-def _differing_networks(configs: Sequence[RunConfig]) -> dict[str, tuple[Any, ...]] | None:
-    kinds = [config.controller for config in configs]
-    if not any(isinstance(kind, NetworkFile) for kind in kinds) or not all(isinstance(k, CircuitKind) for k in kinds):
-        return None
-    # Only a file states thresholds; those of a preset follow from its body.
-    senses = all(isinstance(kind, NetworkFile) and kind.text for kind in kinds)
-    own = [network_values(config, senses=senses) for config in configs]
-    rows = {name: tuple(one.get(name, LACKING) for one in own) for name in dict.fromkeys(n for one in own for n in one)}
-    return {name: values for name, values in rows.items() if any(value != values[0] for value in values)}
 
 
 def _plain(value: Any) -> Any:

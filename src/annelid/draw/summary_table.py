@@ -301,7 +301,7 @@ def fields_table(comparison: Comparison) -> str:
         blocks.append("the networks are the same")
     if any(field != "controller.text" for field in left_out):
         named = listed(sorted({field.partition(".")[0] for field in left_out}))
-        blocks.append(f"different kinds of {named}: only fields that all have are listed; --json lists all")
+        blocks.append(f"different kinds of {named}: only fields that all have; --json lists all")
     return "\n\n".join(blocks)
 
 

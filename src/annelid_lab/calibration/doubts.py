@@ -89,6 +89,6 @@ def _lacking(part: Part) -> list[str]:
         return []
     return [
         f"the fitted worm lies {part.rms / factor:.2g}{unit} from the points (rms), where noise and scatter explain "
-        f"{explained / factor:.2g}{unit}: the model lacks something, or the sensors drift; compare signal by signal "
+        f"{explained / factor:.2g}{unit}. The model lacks something, or the sensors drift. Compare signal by signal "
         "with `annelid compare`, measure single segments in a load frame, or free a further parameter"
     ]

@@ -104,6 +104,17 @@ def test_the_last_cycles_of_every_signal_are_held_out() -> None:
     assert set(data.series[walk.held(data)]) == {0, 1, 2}
 
 
+def test_a_cable_force_counts_as_much_as_a_length(tmp_path: Path) -> None:
+    clock = np.arange(0.0, 4.0, 0.02)
+    table = np.column_stack([clock, 80.0 + 20.0 * np.sin(clock), 15.0 + 5.0 * np.cos(clock)])
+    np.savetxt(tmp_path / "walk.csv", table, delimiter=",", header="t_s,s1_mm,f1_N", comments="")
+    rows = ('time = "t_s"', "[map]", 's1_mm = "stretch_length[1, mean]"', 'f1_N = "muscle_force[ring_0]"')
+    (tmp_path / "map.toml").write_text("\n".join(rows))
+    data = Walk(name="walk", data="walk.csv", map="map.toml").read(tmp_path)
+    assert data.unit == "of its standard deviation"
+    assert [data.values[data.series == signal].std() for signal in (0, 1)] == pytest.approx([1.0, 1.0], rel=0.01)
+
+
 def test_a_segment_of_other_stiffness_is_noticed(tmp_path: Path) -> None:
     found = identified(tmp_path, walk(TRUTH["young_modulus"], TRUTH["damping_time"], stiffer=(1.0, 1.2, 1.0)))
     assert any("model lacks something" in sentence for sentence in found.warnings)

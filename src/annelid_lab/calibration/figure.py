@@ -75,4 +75,4 @@ def _draw_misfits(fit: Fit, known: Intervals, panels: Sequence[Axes]) -> None:
         axes.set(
             xlabel=plain(f"{name.replace('_', ' ')} ({unit.strip() or '1'})"), ylabel="rms over noise", yscale="log"
         )
-        panel_title(axes, "misfit of the worms computed")
+        panel_title(axes, "misfit of worms")

@@ -7,7 +7,7 @@ the parameters, sample by sample (least squares); how far they scatter about it 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -159,7 +159,7 @@ class Emulator:
             radius: Of the region, ``(p,)``.
         """
         self.model, self.used, self.centre, self.radius = model, used, centre, radius
-        self._fits: list[tuple[list[int], int, dict[str, Array]]] = []
+        self._fits: list[tuple[list[int], int, Mapping[str, Any]]] = []
         self.spare = len(used)
         points = [model.measured(model.with_untested(one, centre)) for one in used]
         for e, active in enumerate(model.active):
@@ -172,7 +172,7 @@ class Emulator:
             kept = [i for i in active if self._moves(np.stack([one[e] for one in points]), active, i, order)]
             terms = self._design(kept, order)
             self.spare = min(self.spare, len(used) - terms.shape[1])
-            fits: dict[str, Array] = {name: np.linalg.lstsq(terms, one, rcond=None)[0] for name, one in values.items()}
+            fits = {name: np.linalg.lstsq(terms, one, rcond=None)[0] for name, one in values.items()}
             self._fits.append((kept, order, fits))
 
     def _moves(self, points: Array, active: list[int], i: int, order: int) -> bool:

@@ -28,6 +28,8 @@ NORMAL_MEDIAN = 0.6745
 """Median of the distance of normal numbers from their mean, in standard deviations."""
 FEWEST_CYCLES = 2.0
 """Cycles that a log should have."""
+GAP = 0.5
+"""Longest gap of a log, in cycles, that is not named."""
 LAGS, DRIFTS = 300, 41
 """Lags and drifts that are looked at before the best is refined."""
 
@@ -149,7 +151,7 @@ class Walk(Experiment):
         return np.concatenate(floor)
 
     def doubts(self, data: Data, found: Found) -> list[str]:
-        """Says whether the log is long enough."""
+        """Says whether the log is long and whole enough."""
         from annelid_lab.logs.agreement import period
 
         source, time_s = data.source, found["time_0"]
@@ -158,12 +160,20 @@ class Walk(Experiment):
         cycle_s = period(values) * float(time_s[1] - time_s[0])
         if not np.isfinite(cycle_s):
             return [f"no period is found in the {time_s[-1]:.3g} s of the run: let it and the log last several cycles"]
-        if span_s >= FEWEST_CYCLES * cycle_s:
-            return []
-        return [
-            f"the log has {span_s / cycle_s:.1f} cycles of {cycle_s:.2g} s: what repeats cannot be told from what "
-            f"happened once; log at least {FEWEST_CYCLES:g}"
-        ]
+        sentences: list[str] = []
+        if span_s < FEWEST_CYCLES * cycle_s:
+            sentences.append(
+                f"the log has {span_s / cycle_s:.1f} cycles of {cycle_s:.2g} s: what repeats cannot be told from what "
+                f"happened once; log at least {FEWEST_CYCLES:g}"
+            )
+        logged = np.unique(np.concatenate(source.at))
+        longest = int(np.diff(logged).argmax())
+        if (gap_s := float(np.diff(logged)[longest])) > GAP * cycle_s:
+            sentences.append(
+                f"nothing was logged for {gap_s:.2g} s after {logged[longest]:.3g} s: if the clock stopped there, all "
+                "that follows is compared too early; log without a gap, or cut the log there"
+            )
+        return sentences
 
     def alignment(self, data: Data, found: Found) -> tuple[float, float]:
         """Time of the run at the log's first instant, s, and drift of the log's clock, where both lie nearest."""

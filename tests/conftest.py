@@ -12,6 +12,9 @@ from concurrent.futures import Executor, Future
 from pathlib import Path
 from typing import Any
 
+# Tests run side by side: threads of linear algebra that wait for each other take twice the processor time.
+os.environ["OPENBLAS_NUM_THREADS"] = "1"
+
 import numpy as np
 import pytest
 from hypothesis import settings

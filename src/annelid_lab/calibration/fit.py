@@ -183,7 +183,7 @@ class Fit:
 def inverse(information: Array) -> Array:
     """Returns the covariance, ``(p, p)``, that belongs to an information, huge where there is none."""
     values, vectors = np.linalg.eigh(information)
-    return (vectors / np.maximum(values, SINGULAR * values[-1])) @ vectors.T
+    return (vectors / np.maximum(values, SINGULAR * max(values[-1], 1.0))) @ vectors.T
 
 
 def points_at(data: Data, rows: np.ndarray) -> Data:
@@ -294,12 +294,16 @@ def _searched(model: Model, best: Tried, first: float) -> tuple[Tried, Emulator]
         model.run([optimum])
         best = _best(model, plain(model, best), replace(best, logs=model.with_untested(best, optimum).logs))
         share, clear, known = _goal(model, emulator, best)
-        is_open = known >= radius
+        # A region in which worms scatter too much to show any slope is too wide.
+        is_open = (known >= radius) & bool(share <= 1.0 or (known < radius)[moving].any())
         goal = clear + known
         # Once an emulator is as good as the fit, one smaller region shows whether its scatter is that of any worm.
-        last = bool(is_open[moving].all() or (share <= 1.0 and (was_fine or (goal <= radius)[moving].all())))
-        was_fine = share <= 1.0
-        edge = np.abs(best.logs - centre) > 0.8 * radius
+        edge = ~is_open & (np.abs(best.logs - centre) > 0.8 * radius)
+        is_fine = share <= 1.0
+        last = not edge.any() and bool(
+            is_open[moving].all() or (is_fine and (was_fine or (goal <= radius)[moving].all()))
+        )
+        was_fine = is_fine
         centre = best.logs
         goal = np.clip(goal, radius * SHRINK**2, radius) if last else np.where(is_open, radius, radius * SHRINK)
         radius = np.where(is_moving, np.where(edge, radius, goal), np.inf)
@@ -393,7 +397,7 @@ def _finish(fit: Fit, low: Array, high: Array) -> list[Array]:
 def _fit_of(
     model: Model, emulator: Emulator, best: Tried, middle: Array, noises: Sequence[Noise], scatter: Sequence[Array]
 ) -> Fit:
-    experiments = model.worms(best.logs)[1]
+    experiments = [one for _, one in model.worms(best.logs)]
     fitted, smooth = model.measured(best), emulator.predicted(middle)
     slopes = emulator.derivatives(middle)
     floors = [one.noise_floor(data) for one, data in zip(experiments, model.data, strict=True)]

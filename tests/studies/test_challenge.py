@@ -162,6 +162,9 @@ def test_motors_take_the_power_of_a_direct_current_motor() -> None:
     assert electric_energy_J(time_s, 5.0 * ones, 2.0 - shortening) == 0.0, "nothing is given back"
 
 
+NUMBERS = ("speed_m_per_s", "distance_m", "slip_J", "work_J", "electric_J", "in_order")
+
+
 def ranked(*rows: Score) -> dict[tuple[str, str], Any]:
     return {(one.entrant, one.task): one for one in standings(rows)}
 
@@ -281,6 +284,20 @@ def test_runs_of_another_call_are_taken_where_they_are_of_the_same_setup(tmp_pat
         entries(entrants, ["load"], [1000], finer=2, **own),
     )
     assert len({entry.setup for entry in (wanted[0], *others[0], *others[1])}) == 3, "another setup is another run"
+
+
+@pytest.mark.usefixtures("short")
+def test_a_run_of_which_the_integrator_takes_too_much_is_taken_at_half_the_step(tmp_path: Path) -> None:
+    wanted = entries(find_entrants([REFERENCE]), ["level"], [1000], bodies=["three"], duration_s=0.2)
+    [one] = challenge(Store(tmp_path / "once"), wanted)
+    spoiled = replace(one, refused="the integrator took 9% of the muscles' work", speed_m_per_s=0.0)
+    store = Store(tmp_path / "again")
+    [again] = challenge(store, wanted, [spoiled])
+    assert again == replace(one, key=again.key, halved=True, **{name: getattr(again, name) for name in NUMBERS})
+    assert (again.refused, again.key != one.key, again.work_J > 0) == ("", True, True)
+    half = wanted[0].halved().case
+    assert store.run(half).config.clock.physics_timestep_s == 0.002
+    assert challenge(store, wanted, [again]) == [again], "it is not halved again"
 
 
 @pytest.mark.usefixtures("short")

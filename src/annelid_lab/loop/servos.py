@@ -70,6 +70,8 @@ class Wiring:
                 raise ConfigError(f"{name} must be a position of {least} .. {most}, not {position}")
         if self.relaxed == self.contracted or self.m_per_count == 0:
             raise ConfigError("relaxed and contracted must differ, and m_per_count must not be 0")
+        if self.rpm_per_unit is not None and not self.rpm_per_unit > 0:
+            raise ConfigError(f"rpm_per_unit must be more than 0, or None for the protocol's, not {self.rpm_per_unit}")
 
     @property
     def mode(self) -> int | None:

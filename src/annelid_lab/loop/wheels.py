@@ -8,6 +8,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from annelid.errors import ConfigError
 from annelid.protocols import Array, Sensation
 from annelid_lab.loop.dynamixel import BROADCAST, PROTOCOLS, STEPS_PER_TURN, SYNC_WRITE, Register
 from annelid_lab.loop.pseudo_robot import PseudoRobot
@@ -43,9 +44,16 @@ class Wheels:
             wiring: Positions, protocol and unit of speed; with ``is_wheel``.
             cable_m: Length of cable from relaxed to contracted, m.
             stall_torque_Nm: Torque at which full output stalls, N m; infinite for servos that keep their speed.
+
+        Raises:
+            ConfigError: The servos are no wheels, or a word is for one that pulls no muscle.
         """
+        if not wiring.is_wheel:
+            raise ConfigError("is_wheel is False, and speed words drive wheels: make Wiring(.., is_wheel=True)")
         self._words, self._wiring = list(words), wiring
         self._muscle_of = {servo: muscle for muscle, servo in enumerate(servos, start=1)}
+        if unknown := {servo for _, servo, _ in self._words} - self._muscle_of.keys():
+            raise ConfigError(f"servos has {list(servos)}, and words are for {sorted(unknown)}: name these, too")
         steps = wiring.relaxed - wiring.contracted
         radius_m = cable_m / (2 * math.pi * abs(steps) / STEPS_PER_TURN)
         full = MOST_SPEED * wiring.steps_per_s

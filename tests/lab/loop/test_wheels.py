@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from annelid.errors import ConfigError
 from annelid.protocols import Sensation
 from annelid_lab.loop import Wheels, Wiring
 
@@ -55,6 +58,19 @@ def test_a_wheel_stalls_where_its_segment_is_at_its_narrowest() -> None:
     assert [wound(wheels, time_s)[0] for time_s in (0.0, 1.0, 2.0)] == pytest.approx(
         [0.0, 1.0, 1.0 - 300 * UNIT_TURNS_PER_S]
     )
+
+
+@pytest.mark.parametrize(
+    ("word", "changes", "says"),
+    [
+        ((0.0, 1, 5), {"is_wheel": False, "contracted": 9}, "is_wheel is False"),
+        ((0.0, 3, 5), {}, r"words are for \[3\]"),
+        ((0.0, 1, 5), {"rpm_per_unit": 0.0}, "rpm_per_unit must be more than 0"),
+    ],
+)
+def test_wheels_that_cannot_be_are_refused(word: tuple[float, int, int], changes: dict[str, Any], says: str) -> None:
+    with pytest.raises(ConfigError, match=says):
+        Wheels([word], (1, 2), replace(ONE_TURN, **changes), cable_m=0.1)
 
 
 @pytest.mark.skipif(shutil.which("c++") is None, reason="there is no C++ compiler called c++")

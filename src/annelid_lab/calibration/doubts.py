@@ -16,8 +16,9 @@ UNKNOWN = 0.3
 """Relative error of a combination of parameters above which the data do not determine it."""
 ALIKE = 0.9
 """Correlation above which two parameters are not told apart."""
-WRONG = 2.0
-"""How many times as far as noise and scatter explain points lie from a model that lacks something."""
+WRONG = 1.25
+"""How many times as far as noise and scatter explain points lie from a model that lacks something: three standard
+errors, of the rms of 180 points and of a noise that is estimated from 800 samples."""
 LEAST_WRONG = 0.01
 """Of the standard deviation of the points: what is less does not matter."""
 UNLIKE = 0.5

@@ -163,7 +163,7 @@ def test_an_experiment_with_another_payload_is_fitted_beside_the_first(tmp_path:
     density = "body.strands.linear_density_kg_per_m"
     rng = np.random.default_rng(1)
     write(tmp_path / "strand.csv", strand_table(rng))
-    write(tmp_path / "heavy.csv", strand_table(rng, **{density: 0.05}))
+    write(tmp_path / "heavy.csv", strand_table(rng, 3e-4, 400, **{density: 0.05}))
     heavy = STRAND | {"name": "heavy", "data": "heavy.csv", "set": {density: 0.05}}
     found = identify(load_identify_study(study_of({"young_modulus": {}, "damping_time": {}}, STRAND, heavy)), tmp_path)
     assert [*found.fit.values.values()] == pytest.approx([0.3e9, 0.06], rel=0.02)

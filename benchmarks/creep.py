@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import argparse
 import csv
-from math import atan, degrees
+from math import atan, degrees, nan
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -20,7 +20,9 @@ from typing import Any
 import numpy as np
 
 from annelid import load_config, simulate
-from annelid.config import RunConfig
+from annelid.arena.kinds.floor import Ground
+from annelid.body.formulations.rods import Rods
+from annelid.body.worm import WormBody
 from annelid.output import write_csv
 from annelid.simulation.runfile import Run
 
@@ -29,21 +31,7 @@ PRESETS = (
     *("riddle2025-muscles", "riddle2025-adaptive", "riddle2025-steered", "crawler", "crawler-servo", "crawler-timed"),
 )
 STILL_S, SETTLED_S = 60.0, 20.0
-HARDER = 10.0
-
-
-def at_rest(preset: str, steps: int = 1) -> RunConfig:
-    """A preset's body that never contracts, on a slope of half its friction angle, in steps so many times as short."""
-    config = load_config(preset)
-    return load_config(
-        preset,
-        {
-            "duration_s": STILL_S,
-            "controller": {"kind": "program", "contractions": []},
-            "arena.slope_deg": degrees(atan(config.arena.friction)) / 2,
-            "clock.physics_timestep_s": config.clock.physics_timestep_s / steps,
-        },
-    )
+HARDER, RATIO = 10.0, "body.formulation.friction_impedance_ratio"
 
 
 def path_m(run: Run, from_s: float) -> float:
@@ -55,16 +43,22 @@ def path_m(run: Run, from_s: float) -> float:
 
 def row(preset: str, folder: Path) -> dict[str, Any]:
     """The numbers of one preset."""
-    found: dict[str, Any] = {"preset": preset, "slope_deg": at_rest(preset).arena.slope_deg}
+    config = load_config(preset)
+    assert isinstance(config.body, WormBody)
+    assert isinstance(config.arena, Ground)
+    slope_deg = degrees(atan(config.arena.friction)) / 2
+    found: dict[str, Any] = {"preset": preset, "slope_deg": slope_deg}
+    still = {"duration_s": STILL_S, "controller": {"kind": "program", "contractions": []}, "arena.slope_deg": slope_deg}
     for steps, name in ((1, "creep_mm_per_s"), (2, "creep_half_step_mm_per_s")):
-        run = simulate(at_rest(preset, steps), folder / name)
+        step = {"clock.physics_timestep_s": config.clock.physics_timestep_s / steps}
+        run = simulate(load_config(preset, still | step), folder / name)
         found[name] = -1e3 * path_m(run, SETTLED_S) / (STILL_S - SETTLED_S)
-    ratio = load_config(preset).body.formulation.friction_impedance_ratio
-    walks = {}
-    for times in (1.0, HARDER):
-        config = load_config(preset, {"body.formulation.friction_impedance_ratio": times * ratio})
-        walks[times] = path_m(simulate(config, folder / f"walk_{times:g}"), config.duration_s / 3)
-    return found | {"travel_m": walks[1.0], "travel_harder_over_it": walks[HARDER] / walks[1.0]}
+    walk = path_m(simulate(config, folder / "walk"), config.duration_s / 3)
+    harder = nan
+    if isinstance(config.body.formulation, Rods):
+        ratio = {RATIO: HARDER * config.body.formulation.friction_impedance_ratio}
+        harder = path_m(simulate(load_config(preset, ratio), folder / "harder"), config.duration_s / 3) / walk
+    return found | {"travel_m": walk, "travel_harder_over_it": harder}
 
 
 def main() -> None:

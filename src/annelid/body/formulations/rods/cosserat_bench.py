@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from importlib.metadata import version
 
 import mujoco
 import numpy as np
 from cosseratbench import Capability, Diverged, End, EndCondition, Rod, Scenario, Trajectory
 
-from annelid import __version__
 from annelid.body.constraint_rows import add_row, tendons_to_rows
 from annelid.body.formulations import BDF2_SHARE
 from annelid.body.formulations.rods.net import SOLVER_ITERATIONS, SOLVER_TOLERANCE, add_rod, add_vertex, lumped_masses
@@ -29,7 +29,7 @@ class AnnelidSolver:
     """
 
     name = "annelid"
-    backend_version = __version__
+    backend_version = version("annelid")
     capabilities = frozenset[Capability]()
 
     def __init__(self, time_step_scale: float = 1.0) -> None:
@@ -84,7 +84,7 @@ class AnnelidSolver:
             # A rod that begins stretched has the mass of its length at rest.
             density = rod.material.density * rod.area * rod.length / n_elements
             for name, place, mass in zip(
-                bodies, places, lumped_masses(np.arange(len(places))[:, None], density), strict=True
+                bodies, places, lumped_masses(np.arange(float(len(places)))[:, None], density), strict=True
             ):
                 add_vertex(spec, name, place, float(mass))
         for number, (places, bodies, rod) in enumerate(zip(straight, names, rods, strict=True)):

@@ -120,7 +120,7 @@ TASKS = {
     "sloped pipe": Task(
         "docs/tutorials/pipes.md",
         (
-            "annelid run crawler --arena pipe --set arena.slope=10 --duration 6 -o uphill",
+            "annelid run crawler --arena pipe --set arena.slope_deg=10 --duration 6 -o uphill",
             "annelid draw uphill --time 3 --camera side -o uphill/side.png",
         ),
         gives=("uphill/side.png",),

@@ -44,6 +44,7 @@ from annelid.cli.entry import (
     end_study,
     lock,
     main,
+    remark,
     study,
     typed_command,
 )
@@ -92,6 +93,7 @@ __all__ = [
     "print_worm",
     "refuse_existing",
     "refuse_json",
+    "remark",
     "runs_from",
     "study",
     "typed_command",

@@ -20,7 +20,9 @@ from annelid.cli import (
     play,
     print_paths,
     refuse_existing,
+    remark,
     runs_from,
+    wants_json,
 )
 from annelid.errors import ConfigError, RunFileError
 
@@ -122,6 +124,8 @@ def compare_command(
         typer.echo(comparison_table(comparison, everything=everything))
         typer.echo(f"\n{fields_table(comparison) if comparison.fields else 'the configurations are the same'}")
     if output is None:
+        if not wants_json():
+            typer.echo("next: all numbers with --all, figures of the runs with -o FOLDER")
         return
     written = [write_json(output / "comparison.json", comparison.to_dict())]
     for name, draw in figures.items():
@@ -152,7 +156,7 @@ def _compare_animals(worms: list[Path], output: Path | None, *, force: bool) -> 
     own = [subject_of(run, run.path.absolute().parent.name) for run in runs]
     for one in own:
         if not one.numbers:
-            complain(f"note: {one.name} has no complete cycle behind its first one: run it longer, with --duration")
+            remark(f"note: {one.name} has no complete cycle behind its first one: run it longer, with --duration")
     subjects = [*own, *published()]
     sentences = list(dict.fromkeys(filter(None, map(limits, runs))))
     record = {**animals_record(subjects), "limits": sentences}
@@ -196,7 +200,7 @@ def _compare_measured(
     if not give(found.to_dict()):
         typer.echo(agreement_table(found))
     for note in found.notes:
-        complain(f"note: {note}")
+        remark(f"note: {note}")
     if output is not None:
         print_paths([write_json(output / "agreement.json", found.to_dict())])
         print_paths([agreement_figure(found, output / "agreement")])

@@ -12,6 +12,7 @@ import argparse
 import csv
 import os
 import tempfile
+from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
@@ -19,6 +20,7 @@ from typing import Any
 
 import numpy as np
 from identify_recovery import slow, summary, write_log
+from numpy.typing import NDArray
 
 from annelid import load_config, simulate
 from annelid.experiment import SHEAR_OVER_YOUNG
@@ -53,21 +55,32 @@ def make_walk(number: int, folder: Path) -> tuple[dict[str, Any], dict[str, floa
     run = simulate(load_config("riddle2023-rods", known | secret), folder / "robot", progress=False)
     clock = np.arange(0.0, SPAN_S, 0.02)
     noise_m, slow_m, shift_s = rng.uniform(2e-4, 8e-4), rng.uniform(0.0, 3e-4), rng.uniform(0.1, RUN_S - SPAN_S)
-    log = {"time_s": clock}
-    for segment, signal in enumerate(SIGNALS, start=1):
+    lengths: list[NDArray[np.float64]] = []
+    for signal in SIGNALS:
         time_s, length_m, _ = run_series(run, signal)
         error_m = rng.normal(0.0, noise_m, len(clock)) + slow(rng, clock, slow_m, 1.0)
-        log[f"s{segment}_mm"] = 1e3 * (np.interp(clock + shift_s, time_s, length_m) + error_m)
+        lengths.append(np.interp(clock + shift_s, time_s, length_m) + error_m)
+    return write_walk(folder, clock, lengths, known, rng), truth
+
+
+def write_walk(
+    folder: Path,
+    clock: NDArray[np.float64],
+    lengths: Sequence[NDArray[np.float64]],
+    known: dict[str, Any],
+    rng: np.random.Generator,
+) -> dict[str, Any]:
+    """Writes a log of lengths, m, and its map into a folder, and returns a study of it."""
+    log = {"time_s": clock} | {f"s{segment}_mm": 1e3 * one for segment, one in enumerate(lengths, start=1)}
     write_log(folder / "walk.csv", log, rng)
     rows = [f's{segment}_mm = "{signal}"' for segment, signal in enumerate(SIGNALS, start=1)]
     (folder / "map.toml").write_text("\n".join(['time = "time_s"', "[map]", *rows]))
-    study = {
+    return {
         "preset": "riddle2023-rods",
         "set": known,
         "parameters": {"young_modulus": {"start": 3e8}, "damping_time": {"start": 0.145}},
         "experiments": [{"kind": "walk", "name": "walk", "data": "walk.csv", "map": "map.toml"}],
     }
-    return study, truth
 
 
 def rows_of(number: int, executor: ProcessPoolExecutor) -> list[list[object]]:
@@ -86,13 +99,13 @@ def rows_of(number: int, executor: ProcessPoolExecutor) -> list[list[object]]:
     ]
 
 
-def main(path: Path, walks: int = WALKS, first: int = 0) -> None:
+def main(path: Path, walks: int, first: int, jobs: int) -> None:
     """Identifies the robots that a table of results lacks."""
     if not path.exists():
         path.write_text(",".join(HEADS) + "\n", encoding="utf-8")
     with path.open(encoding="utf-8") as file:
         done = {int(row["robot"]) for row in csv.DictReader(file)}
-    with ProcessPoolExecutor(os.cpu_count(), get_context("spawn")) as executor:
+    with ProcessPoolExecutor(jobs, get_context("spawn")) as executor:
         for number in range(first, walks):
             if number in done:
                 continue
@@ -113,5 +126,6 @@ if __name__ == "__main__":
     parser.add_argument("csv", type=Path, help="file for the numbers, which goes on where it ended")
     parser.add_argument("--first", type=int, default=0, help="number of the first robot")
     parser.add_argument("--walks", type=int, default=WALKS, help="number past the last robot")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="runs at a time")
     given = parser.parse_args()
-    main(given.csv, given.walks, given.first)
+    main(given.csv, given.walks, given.first, given.jobs)

@@ -190,6 +190,25 @@ def test_the_worm_crawls_alike_with_its_controller_in_c(tmp_path: Path) -> None:
     assert ours.elongation_mean_max_m == pytest.approx(theirs.elongation_mean_max_m, rel=0.01)
 
 
+def test_another_file_under_the_firmware_s_name_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "SEC_ver2.ino").write_text("void setup() {}\nvoid loop() {}\n", encoding="utf-8")
+    with pytest.raises(SystemExit, match="SHA-256"):
+        example("laboratory_firmware").main(tmp_path / "SEC_ver2.ino", tmp_path / "turn")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("c++") is None, reason="no C++ compiler")
+def test_a_sketch_of_the_laboratory_s_protocol_turns_the_twin(tmp_path: Path) -> None:
+    example("laboratory_firmware").main(EXAMPLES / "laboratory_firmware" / "bend.ino", tmp_path / "turn")
+    lines = (tmp_path / "turn" / "waves.csv").read_text(encoding="utf-8").splitlines()
+    (_, path_m, heading_deg, slip_m, *_) = map(float, lines[1].split(","))
+    assert len(lines) == 2
+    assert path_m > 0.01
+    assert heading_deg > 1.0, "to the left, where wheels 1 to 6 wind more"
+    assert slip_m > 0
+    assert (tmp_path / "turn" / "waves.png").stat().st_size > 10_000
+
+
 def test_every_example_is_run_here() -> None:
     own = Path(__file__).read_text(encoding="utf-8")
     assert [path.stem for path in sorted(EXAMPLES.glob("*.py")) if f'"{path.stem}"' not in own] == []

@@ -135,12 +135,12 @@ def suggest(name: str, valid: Iterable[str]) -> str:
         valid: The names that exist.
 
     Returns:
-        For example ``"did you mean 'riddle2023'? Valid: riddle2022-planar, riddle2023"``.
+        For example ``"did you mean 'riddle2023'? The valid ones are riddle2022-planar, riddle2023"``.
     """
     names = sorted(valid)
     near = nearest(name, names)
-    hint = f"did you mean {shortened(near)!r}? " if near is not None else ""
-    return f"{hint}Valid: {listed(names)}"
+    hint = f"did you mean {shortened(near)!r}? T" if near is not None else "t"
+    return f"{hint}he valid ones are {listed(names)}"
 
 
 def nearest(name: str, valid: Sequence[str]) -> str | None:

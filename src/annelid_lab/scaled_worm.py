@@ -9,6 +9,7 @@ with others it is close to it.
 from __future__ import annotations
 
 from math import ceil, log, pi, sqrt
+from textwrap import wrap
 from typing import Any
 
 from annelid.body import (
@@ -39,6 +40,8 @@ MOST_RADIUS_M = 1.0
 CYCLES = 4
 """Cycles of the paper's network, 0.875 s a segment at the base's size, that a run lasts."""
 TURN_S = 0.875
+LINE = 80
+"""Characters of a line of the file, with its comment."""
 
 Fields = dict[str, tuple[Any, str]]
 """Values by dotted path, each with the rule that it follows."""
@@ -115,34 +118,34 @@ def similar_worm(
         (young_modulus_Pa, "as asked") if young_modulus_Pa else (base_Pa * longer, f"{side}, as the weight needs")
     )
     stiffer = young_Pa / base_Pa
-    of_length = "the length asked for" if length_m or segment_length_m else "rhombi of the base's shape"
+    of_length = "the length asked for" if length_m or segment_length_m else "rhombi of the same shape"
     fields: Fields = {f"body.mesh.{name}": (value, "as asked") for name, value in geometry.items()} | {
         "body.mesh.angular_rate_rad_per_m": (rate, of_length),
         "body.mesh.elements_per_side": (
             elements,
-            "the base's; a strand turns by 30 degrees in one at most, and the engine slows above 3,900",
+            "as there; a strand turns by at most 30 degrees in one, and the engine slows above 3,900",
         ),
-        "body.mesh.planes_between_rings": (planes, "rhombi close to the base's shape"),
+        "body.mesh.planes_between_rings": (planes, "rhombi nearly of the same shape"),
         "body.mesh.free_planes_at_ends": (planes - 1, "one less than between rings"),
         "body.mesh.rear_overhang_m": (turn / rate / 2.0, "half the distance of two planes"),
         "body.strands.radius_m": (strand, strand_rule),
         "body.strands.young_modulus_Pa": (young_Pa, young_rule),
         "body.strands.shear_modulus_Pa": (
             strands.one_number("shear_modulus_Pa") * stiffer,
-            "the base's ratio to Young's modulus",
+            "the same ratio to Young's modulus",
         ),
         "body.strands.linear_density_kg_per_m": (
             strands.one_number("linear_density_kg_per_m") * thicker**2,
-            "the base's density",
+            "the same density",
         ),
         "body.strands.damping_time_s": (strands.damping_time_s * slower, "a time: radius^0.5"),
-        "body.pins.mass_kg": (pins.one_number("mass_kg") * thicker**2 * longer, "the base's share of the weight"),
+        "body.pins.mass_kg": (pins.one_number("mass_kg") * thicker**2 * longer, "the same share of the weight"),
         "body.pins.radius_m": (pins.radius_m * scale, "a length"),
         "body.springs.stiffness_N_per_m": (
             springs.one_number("stiffness_N_per_m") * stiffer * thicker**4 / longer**3,
             "strands' bending stiffness over side^3",
         ),
-        "body.rings.length_range_m": (ranges, "the base's share of the ring at rest"),
+        "body.rings.length_range_m": (ranges, "the same share of the ring at rest"),
         "body.rings.maximum_velocity": (
             rings.model_dump()["maximum_velocity"] / slower,
             "lengths a second: radius^-0.5",
@@ -178,7 +181,7 @@ def similar_worm(
     low, high = window
     if low >= high:
         raise ConfigError(f"n_helices = {n_helices}: neighbours lift a segment further than it lengthens; take more")
-    fields["body.rings.peak_force_N"] = (force, "the base's share of what the mesh bears")
+    fields["body.rings.peak_force_N"] = (force, "the same share of what the mesh bears")
     steps = _steps(base, n_segments, slower, longest_step_s(body, force))
     if rear_radius_m is not None:
         fields |= _tapered(body, force, ranges, rear_radius_m)
@@ -197,8 +200,8 @@ def _tapered(body: WormBody, force_N: float, range_m: list[float], rear_radius_m
     ranges = [[bound * radius / front_m for bound in range_m] for radius in radii]
     return {
         "body.mesh.radius_m": (radii, "even from the first ring to the last"),
-        "body.rings.length_range_m": (ranges, "the base's share of each ring at rest"),
-        "body.rings.peak_force_N": (forces, "the base's share of what the mesh bears there"),
+        "body.rings.length_range_m": (ranges, "the same share of each ring at rest"),
+        "body.rings.peak_force_N": (forces, "the same share of what the mesh bears there"),
     }
 
 
@@ -214,13 +217,17 @@ def worm_text(fields: Fields) -> str:
     tables: dict[str, list[str]] = {"": []}
     for path, (value, rule) in fields.items():
         table, _, name = path.rpartition(".")
-        tables.setdefault(table, []).append(f"{f'{name} = {toml_value(value)}':<40}  # {rule}")
+        line = f"{name} = {toml_value(value)}"
+        with_rule = f"{line:<40}  # {rule}"
+        above = wrap(rule, LINE, initial_indent="# ", subsequent_indent="# ")
+        tables.setdefault(table, []).extend([with_rule] if len(with_rule) <= LINE else [*above, line])
     mesh = worm_of(config).mesh
     shape = f"radius {mesh.radii_m[0]:g} m, {mesh.n_segments} segments and {mesh.n_helices} strands"
     heading = [
-        f"# A worm of {shape} that moves as {BASE} does.",
-        "# Numbers follow from the geometry by Froude similarity; the rule stands beside each. Replace what you can",
-        "# measure on your robot. annelid check compares the numbers with one another.",
+        *wrap(f"A worm of {shape} that moves as {BASE} does.", LINE, initial_indent="# ", subsequent_indent="# "),
+        "# Numbers follow from the geometry by Froude similarity. The rule stands beside",
+        f'# each; "the same" is as in {BASE}. Replace what you can measure on',
+        "# your robot. annelid check compares the numbers with one another.",
         f'extends = "{BASE}"',
     ]
     parts = ["\n".join(([f"[{name}]"] if name else heading) + lines) for name, lines in tables.items()]
@@ -273,7 +280,7 @@ def _planes_and_rate(
         name = "length_m" if length_m else "segment_length_m"
         raise ConfigError(
             f"{name} = {wanted_m:g} does not fit {n_segments} segments of radius {radius_m:g} m: "
-            f"with {planes} planes between rings it must be between {least:.2g} and {most:.2g} m"
+            f"it must be between {least:.2g} and {most:.2g} m"
         )
     return planes, rate(planes)
 

@@ -13,6 +13,8 @@ from hypothesis import strategies as st
 from annelid.analysis import summary
 from annelid.analysis.comparison import LACKING, compare, differing_fields, relative_difference, run_labels
 from annelid.config import load_config
+from annelid.control import Sns, circuit_text
+from annelid.draw.summary_table import fields_table
 from annelid.simulation.loop import simulate
 from annelid.simulation.runfile import Run
 
@@ -79,3 +81,24 @@ def test_labels_are_as_much_of_the_paths_as_tells_them_apart(planar_run: Run) ->
     assert run_labels(at("/a/one", "/a/two")) == ("one", "two")
     assert run_labels(at("/a/one", "/b/one")) == ("a/one", "b/one")
     assert run_labels(at("/a/one", "/a/one")) == ("one (1)", "one (2)")
+
+
+def test_networks_from_files_are_compared_part_by_part(rods: Run) -> None:
+    before = rods.config
+    text = circuit_text(Sns().circuit(before, 4))
+    head, of_connection, rest = text.partition("[[connection]]")
+    whole = next(line for line in rest.splitlines() if line.startswith("conductance_uS"))
+    changed = head + of_connection + rest.replace(whole, "conductance_uS = 0.1", 1)
+    of_file = [load_config("riddle2023-rods", _network(one)) for one in (text, changed)]
+    runs = [replace(rods, config=config) for config in (before, *of_file)]
+    assert compare(runs[:1] * 2).network is None
+    assert compare(runs[:2]).network == {}
+    assert fields_table(compare(runs[:2])).count("the networks are the same") == 1
+    [(row, values)] = (compare(runs[1:]).network or {}).items()
+    assert row.endswith(": conductance_uS")
+    assert values == (float(whole.partition("=")[2]), 0.1)
+    assert "name =" not in fields_table(compare(runs))
+
+
+def _network(text: str) -> dict[str, object]:
+    return {"body.mesh.n_segments": 4, "duration_s": 0.1, "controller.kind": "network", "controller.text": text}

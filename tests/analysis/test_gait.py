@@ -164,7 +164,7 @@ def test_the_balance_splits_what_the_books_say() -> None:
     assert read == pytest.approx([1.2, 2.4, -3.6, 7.2, 4.8, 10.8, 13.2])
     assert balance.energy_numerical_share == pytest.approx(13.2 / 36.0)
     rows = {row.label: row.ours for row in summary_rows(summary(run_of(data)), run_of(data).config)}
-    assert rows["work goes to (%)"] == "stored 0, slip 20, contact 13, damping 30, step 37"
+    assert rows["work goes to (%)"] == "stored 0, slip 20, contact 13, damping 30, step error 37"
 
 
 def test_a_planar_worm_s_balance_needs_no_weight() -> None:

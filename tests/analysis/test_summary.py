@@ -14,6 +14,7 @@ from annelid.analysis import NUMBERS, Summary, summary
 from annelid.analysis.paper import published
 from annelid.config import check_config, field_paths, load_config, preset_names
 from annelid.config.run import published_worms
+from annelid.draw.summary_table import summary_rows
 from annelid.simulation.runfile import Run
 from synthetic import FIRST_HELIX_EXCESS, HOLDING_FORCE_N, PEAKS_M, wave_data
 
@@ -173,3 +174,16 @@ def test_travel_is_net_and_its_path_goes_forwards_and_backwards() -> None:
     numbers = summary(run_of(data))
     assert numbers.travel_m == pytest.approx(-0.1)
     assert numbers.travel_path_m == pytest.approx(0.5)
+
+
+def test_a_rhythm_that_stops_is_a_warning_and_no_reason_to_run_longer() -> None:
+    data = wave_data(duration_s=8.0)
+    data["activation"][data["time"].values > 1.0] = 0.0
+    numbers = summary(run_of(data))
+    assert numbers.rhythm_verdict == "silent"
+    assert [doubt.partition(" (")[0] for doubt in numbers.warnings] == ["the rhythm stops"]
+    rows = {row.label: row.ours for row in summary_rows(numbers, load_config("riddle2023-rods"))}
+    assert rows["warnings"] == "1, below"
+    assert rows["order"].endswith(", then none")
+    assert rows["speed (cm/s)"] == "none: the rhythm stops"
+    assert not summary(run_of(wave_data())).warnings

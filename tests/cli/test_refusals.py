@@ -166,4 +166,4 @@ def test_ctrl_c_prints_what_was_computed_and_exits_130(tmp_path: Path) -> None:
     assert "Traceback" not in err
     assert "interrupted: what was computed is in long/run.nc" in err
     assert "interrupted after" in out
-    assert err.splitlines()[-1].endswith("continue it with: annelid run --resume long")
+    assert err.endswith("continue it with:\n  annelid run --resume long\n")

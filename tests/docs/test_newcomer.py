@@ -97,7 +97,7 @@ TASKS = {
             "annelid run small.toml -o small",
         ),
         gives=("small.toml", "small/run.nc", "small/figure7.png"),
-        prints="nothing found",
+        prints="no doubts",
     ),
     "ring force": Task(
         "docs/how_to/ring_force.md", ("annelid study load-frame --diameter-share 0.5 -o frame",), prints="2.29"
@@ -120,7 +120,7 @@ TASKS = {
     "sloped pipe": Task(
         "docs/tutorials/pipes.md",
         (
-            "annelid run crawler --arena pipe --set arena.slope=10 --duration 6 -o uphill",
+            "annelid run crawler --arena pipe --set arena.slope_deg=10 --duration 6 -o uphill",
             "annelid draw uphill --time 3 --camera side -o uphill/side.png",
         ),
         gives=("uphill/side.png",),

@@ -129,7 +129,8 @@ def test_whoever_interrupts_the_finer_runs_keeps_the_run_itself(
     command = ("run", "riddle2022-planar", "--duration", "0.5", "--check", "-o", str(tmp_path / "walk"))
     done = annelid(*command)
     assert done.exit_code == 130
-    assert "go on with: annelid run" in done.err
+    assert "go on with:\n  annelid run" in done.err
+    assert "interrupted: step and mesh are not checked" in done.out
     assert ", 3 segments, 0.5 s" in done.out
     assert done.out.splitlines()[-1] == str(tmp_path / "walk/run.nc")
     assert (open_run(tmp_path / "walk").status, len(computed)) == ("complete", 1)

@@ -61,9 +61,9 @@ def tube_table(rng: np.random.Generator, noise_N: float = 0.3, n: int = 200) -> 
     return {"time_s": 0.1 * np.arange(n), "elongation_mm": 1e3 * elongation, "force_N": force}
 
 
-def strand_table(rng: np.random.Generator, noise_m: float = 3e-4, n: int = 400) -> Table:
+def strand_table(rng: np.random.Generator, noise_m: float = 3e-4, n: int = 400, **worm: Any) -> Table:
     time_s = 0.015 * np.arange(n)
-    frequency, rate = RingDown.model_validate(STRAND).mode(worm_of())
+    frequency, rate = RingDown.model_validate(STRAND).mode(load_config(worm_of().model_dump(exclude_none=True), worm))
     tip = 0.05 * np.exp(-rate * time_s) * np.cos(sqrt(frequency**2 - rate**2) * time_s) + rng.normal(0.0, noise_m, n)
     return {"time_s": time_s, "displacement_mm": 1e3 * tip}
 
@@ -157,6 +157,17 @@ def test_several_experiments_are_fitted_at_once(tmp_path: Path) -> None:
     assert ends == pytest.approx(linear, rel=0.03)
     assert not found.warnings
     assert found.fit.n_tests == 0
+
+
+def test_an_experiment_with_another_payload_is_fitted_beside_the_first(tmp_path: Path) -> None:
+    density = "body.strands.linear_density_kg_per_m"
+    rng = np.random.default_rng(1)
+    write(tmp_path / "strand.csv", strand_table(rng))
+    write(tmp_path / "heavy.csv", strand_table(rng, **{density: 0.05}))
+    heavy = STRAND | {"name": "heavy", "data": "heavy.csv", "set": {density: 0.05}}
+    found = identify(load_identify_study(study_of({"young_modulus": {}, "damping_time": {}}, STRAND, heavy)), tmp_path)
+    assert [*found.fit.values.values()] == pytest.approx([0.3e9, 0.06], rel=0.02)
+    assert not found.warnings
 
 
 def test_what_the_data_cannot_tell_apart_is_said(tmp_path: Path) -> None:
@@ -320,6 +331,7 @@ def test_a_defect_is_refused_in_a_sentence(subtests: pytest.Subtests, tmp_path: 
         (whole, {"preset": "riddle2203-rods"}, "did you mean 'riddle2023-rods'"),
         (whole, {"tube": {"inner_diameter_m": 0.01}}, "must be less than outer_diameter_m"),
         (whole, {"tube": {"hold_out": [[0.0, 0.95]]}}, "points to fit"),
+        (whole, {"tube": {"set": {"body.strands.young_modulus_Pa": 1e8}}}, "is fitted by a parameter"),
     )
     for damage, study, says in cases:
         with subtests.test(f"{damage!r:.60}"):

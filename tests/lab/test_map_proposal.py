@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from annelid.errors import AnnelidError
+from annelid.errors import AnnelidError, ConfigError
 from annelid_lab.logs import proposed_map, read_map, read_measured
 
 TIMES_MS = np.arange(0, 2000, 40)
@@ -81,16 +81,30 @@ def test_a_proposed_map_reads_the_log_right(kind: str, tmp_path: Path) -> None:
 def test_a_number_at_the_end_of_a_name_is_no_unit(tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text("t_s,seg_1,seg_2\n" + rows(*(np.arange(30.0) + shift for shift in range(3))))
     proposal, missing = proposed_map(tmp_path / "log.csv")
-    assert tomllib.loads(proposal)["map"]["seg_2"] == {"signal": "stretch_length[2, mean]"}
+    assert tomllib.loads(proposal)["map"]["seg_2"] == {"signal": "stretch_length[2, mean]", "unit": "?"}
     assert missing == ['the unit of "seg_1"', 'the unit of "seg_2"']
+    (tmp_path / "map.toml").write_text(proposal)
+    with pytest.raises(ConfigError, match=r"unit = '\?' is no known unit"):
+        read_measured(tmp_path / "log.csv", read_map(tmp_path / "map.toml"))
 
 
 def test_counts_of_a_potentiometer_need_a_scale(tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text("millis,pot1,pot2\n" + rows(TIMES_MS, TIMES_MS, TIMES_MS))
     proposal, missing = proposed_map(tmp_path / "log.csv")
-    column = {"signal": "stretch_length[1, mean]", "unit": "1", "offset": "free"}
+    column = {"signal": "stretch_length[1, mean]", "unit": "1", "offset": "free", "scale": "?"}
     assert tomllib.loads(proposal)["map"]["pot1"] == column
     assert missing == [f'scale, the metres in a count, of "pot{n}"' for n in (1, 2)]
+    (tmp_path / "map.toml").write_text(proposal)
+    with pytest.raises(ConfigError, match=r"scale"):
+        read_map(tmp_path / "map.toml")
+
+
+def test_an_example_for_a_name_that_is_not_recognised_is_toml_once_uncommented(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text("t_s,a,b\n" + rows(*(np.arange(30.0) + shift for shift in range(3))))
+    proposal, missing = proposed_map(tmp_path / "log.csv")
+    assert missing == ["what the columns are, under [map]; docs/how_to/measured_data.md lists the signals"]
+    completed = tomllib.loads(proposal.replace('# "', '"'))["map"]
+    assert {name: column["unit"] for name, column in completed.items()} == {"a": "mm", "b": "mm"}
 
 
 def test_several_animals_and_unknown_units_are_left_to_the_user(tmp_path: Path) -> None:

@@ -203,7 +203,7 @@ def test_tables_hold_no_formulas(tmp_path: Path) -> None:
 def test_a_sweep_over_names_is_drawn(tmp_path: Path) -> None:
     names = np.array(["$$", "$x^{", "[/bold]"])
     coords = {"name": ("name", names, {"units": "1"}), "other": ("other", names, {"units": "1"})}
-    data = xr.Dataset({"speed_m_per_s": (("name", "other"), np.eye(3), {"units": "m/s"})}, coords)
+    data = xr.Dataset({"speed_m_per_s": (("name", "other"), np.eye(3), {"heading": "speed (m/s)"})}, coords)
     for fields in (["name"], ["name", "other"]):
         sweep_figure(data, fields, ["speed_m_per_s"], tmp_path / "sweep")
         ET.parse(tmp_path / "sweep.svg")

@@ -92,7 +92,7 @@ def test_sigterm_ends_a_sweep_as_ctrl_c_does_and_it_opens_no_port(tmp_path: Path
         assert left_after(process, signal.SIGTERM) == []
         assert process.wait(60) == 130
     log = (tmp_path / "log").read_text()
-    assert "annelid: interrupted: finished runs are kept in sweep/runs; go on with: annelid sweep study.toml" in log
+    assert "annelid: interrupted: finished runs are kept in sweep/runs; go on with:\n  annelid sweep study.toml" in log
     assert "Traceback" not in log
     assert "leaked" not in log
 

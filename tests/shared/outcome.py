@@ -21,12 +21,12 @@ class Outcome:
         self.exit_code, self.out, self.err = exit_code, out, err
 
     def sentence(self) -> str:
-        """The one line on stderr that a user error ends with; fails if there is anything else."""
+        """The one sentence on stderr that a user error ends with; fails if there is anything else."""
         assert "Traceback" not in self.out + self.err
         lines = self.err.splitlines()
-        assert len(lines) == 1, self.err
+        assert [line[:2] for line in lines] == ["an", *["  "] * (len(lines) - 1)], self.err
         assert lines[0].startswith("annelid: ")
-        return lines[0].removeprefix("annelid: ")
+        return " ".join(map(str.strip, lines)).removeprefix("annelid: ")
 
 
 Command = Callable[..., Outcome]

@@ -85,7 +85,7 @@ def test_claims_find_their_numbers_and_miss_none_silently(made: Outcome) -> None
     }
     for claim in READERS:
         assert judge(claim, OneRun(findings, "quick", made)).verdict != "not testable here"
-        with pytest.raises(KeyError, match=r"has no number '.*did you mean .*_new'.* Valid: "):
+        with pytest.raises(KeyError, match=r"has no number '.*did you mean .*_new'.* The valid ones are "):
             judge(claim, OneRun(renamed, "quick", made))
 
 

@@ -9,6 +9,7 @@ from typing import Any
 from annelid.analysis.numbers import Value
 from annelid.analysis.summary import NUMBERS, summary
 from annelid.config import RunConfig, field_value, fields_of
+from annelid.control.network_file import differing_networks
 from annelid.simulation.runfile import Run
 
 COMPARED = tuple(name for name, one in NUMBERS.items() if one.in_sweeps and name not in ("n_segments", "wave"))
@@ -29,6 +30,7 @@ class Comparison:
     orders: tuple[tuple[int, ...], ...]  # segments (from 1) in the order of their contractions
     numbers: Mapping[str, tuple[Value, ...]]  # by name, SI units
     fields: Mapping[str, tuple[Any, ...]]  # of the configuration in which they differ
+    network: Mapping[str, tuple[Any, ...]] | None = None  # the same of networks, where one is from a file
 
     def differences(self, field: str) -> list[Value]:
         """Returns the `relative_difference` of each run's number to the first run's; None for the first."""
@@ -45,6 +47,7 @@ class Comparison:
                 for field, values in self.numbers.items()
             },
             "configuration": {field: [_plain(value) for value in values] for field, values in self.fields.items()},
+            "network": {field: [_plain(value) for value in values] for field, values in (self.network or {}).items()},
         }
 
 
@@ -58,6 +61,7 @@ def compare(runs: Sequence[Run]) -> Comparison:
         orders=tuple(tuple(one.order) for one in summaries),
         numbers={name: tuple(getattr(one, name) for one in summaries) for name in COMPARED},
         fields=differing_fields([run.config for run in runs]),
+        network=differing_networks([run.config for run in runs], LACKING),
     )
 
 

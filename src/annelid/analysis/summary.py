@@ -71,8 +71,9 @@ def summary(run: Run) -> Summary:
     Quantities whose variables the file lacks (a planar run has no edges) are None.
     """
     data, n_segments = run.variables, run.config.body.n_segments
+    beat = scored_rhythm(run)
     sections = (
-        scored_rhythm(run),
+        beat,
         elongation(data),
         muscles(data, n_segments),
         travel(run),
@@ -86,10 +87,16 @@ def summary(run: Run) -> Summary:
         n_segments=n_segments,
         duration_s=finite(np.ptp(data["time"].values)) if data["time"].values.size else None,
         real_time_factor=finite(run.real_time_factor),
-        warnings=run.warnings,
+        warnings=(*run.warnings, *_doubts(beat)),
         controller=run.attrs.get("controller"),
         **{name: value for section in sections for name, value in vars(section).items()},
     )
+
+
+def _doubts(beat: Rhythm) -> tuple[str, ...]:
+    if beat.rhythm_verdict != "silent":
+        return ()
+    return (f"the rhythm stops ({beat.rhythm_reason}): a longer run shows no more",)
 
 
 def _mesh(data: Mapping[str, Recorded], n_segments: int) -> Mesh:

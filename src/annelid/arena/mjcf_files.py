@@ -40,7 +40,7 @@ def read_mjcf(path: Path, rules: Rules = SCENE, rewrite: Callable[[ET.Element], 
     Raises:
         ConfigError: A file cannot be read, lies elsewhere or is too large, or the text is not what `checked` allows.
     """
-    content = read_bytes(path, f"the file of {rules.what}", MOST_BYTES)
+    content = read_bytes(path, f"{rules.what} in", MOST_BYTES)
     try:
         root = parsed(content, rules)
         _include(root, path.parent, rules, [path.resolve()])
@@ -93,7 +93,7 @@ def _write_in(element: ET.Element, beside: Path, folder: PurePosixPath) -> None:
     """Writes what an element takes from a file into its attributes."""
     path = _inside(beside, folder, element.attrib.pop("file"), _SUFFIXES[element.tag])
     element.attrib.setdefault("name", path.stem)
-    content = read_bytes(path, "the file of the scene", MOST_FILE_BYTES)
+    content = read_bytes(path, "a file of the scene,", MOST_FILE_BYTES)
     if element.tag == "hfield":
         rows = _pixels(content, path)
         element.attrib |= {"nrow": str(rows.shape[0]), "ncol": str(rows.shape[1])}

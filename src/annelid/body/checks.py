@@ -121,9 +121,8 @@ def tolerance_findings(
         problem = f"a segment lengthens by at most {most:.2g} m, to straight strands: its sensor never switches off"
     elif window and low >= high:
         problem = (
-            f"contracting neighbours lengthen a segment by about {low:.2g} m, which must switch nothing, and a "
-            f"tolerance above {high:.2g} m switches a relaxing segment's sensor on too early: no tolerance is "
-            "known to keep the order"
+            f"no tolerance is known to keep the order. Neighbours lengthen a segment by {low:.2g} m, which must switch "
+            f"nothing; above {high:.2g} m a relaxing segment's sensor switches on too early"
         )
         instead = "take controller.kind = sns-robust, or softer strands"
     elif tolerance > high and window:

@@ -26,8 +26,7 @@ class Mesh(Section):
     )
     radius_m: PerSegmentOf[Length] = Field(
         default=0.16,
-        description="radius of the tube at rest, one number for all or one per segment: that of its ring, linear "
-        "between two rings and the same beyond the first and the last",
+        description="radius of the tube at rest: one number, or one for the ring of each segment, linear between rings",
     )
     angular_rate_rad_per_m: Annotated[float, Field(ge=1e-3, le=1e4)] = Field(
         default=14.0, description="turn of a strand per metre of body; the pitch is 2 pi over this"

@@ -39,7 +39,9 @@ def check(
     if not any(finding.severity == "error" for finding in found):
         build_controller(config, build_plant(config))
     if not give([asdict(finding) for finding in found]):
-        typer.echo("\n".join(f"{finding.severity}: {finding}" for finding in found) or "nothing found")
+        typer.echo(
+            "\n".join(f"{finding.severity}: {finding}" for finding in found) or "no doubts: the numbers fit together"
+        )
     if any(finding.severity == "error" for finding in found):
         raise typer.Exit(EXIT_USAGE)
 

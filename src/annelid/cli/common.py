@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from annelid.cli.entry import EXIT_INTERRUPTED, complain, lock, typed_command
+from annelid.cli.entry import EXIT_INTERRUPTED, LINE, complain, lock, remark, typed_command
 from annelid.cli.json_output import give_files, records, wants_json
 from annelid.errors import ConfigError, RunFileError
 
@@ -27,9 +27,6 @@ if TYPE_CHECKING:
 
 FIRST_PRESET, RIGID_PRESET = "riddle2023-fast", "riddle2023-rods"
 """The paper's worm, with its soft crossings, which runs where no preset is named, and with rigid crossings."""
-
-WIDTH = 80
-"""Characters of a line in the terminal."""
 
 
 def presets_from(typed: str) -> list[str]:
@@ -145,7 +142,7 @@ def going_on(folder: Path, *further: str, kept: str = "finished runs are kept") 
     try:
         yield
     except KeyboardInterrupt:
-        complain(f"interrupted: {kept} in {folder}; go on with: {typed_command(*further)}")
+        complain(f"interrupted: {kept} in {folder}; go on with:", typed_command(*further))
         raise typer.Exit(EXIT_INTERRUPTED) from None
 
 
@@ -212,7 +209,7 @@ def _say_unchanged(
         if path in fields_of(config) and path in fields_of(without):
             value = field_value(config, path)
             if value == field_value(without, path):
-                complain(f"note: {path} = {toml_value(value)} changes nothing: {source} has this value")
+                remark(f"note: {path} = {toml_value(value)} changes nothing: {source} has this value")
 
 
 def names_worm(source: str) -> bool:
@@ -295,10 +292,14 @@ def print_worm(config: RunConfig, *, quiet: bool = False) -> None:
         size = f", {config.body.n_segments} segments, {config.duration_s:g} s"
         # What a summary has in brackets is how long it takes to compute.
         what = f"{config.name}: {config.summary.partition(' (')[0]}".removesuffix(": ")
-        typer.echo(shorten(what, WIDTH - len(size), placeholder=" ..") + size)
+        while len(what) > LINE - len(size) and ", " in what:
+            what = what.rpartition(", ")[0]
+        typer.echo(shorten(what, LINE - len(size), placeholder=" ..") + size)
 
 
-def print_run(run: Run, *, everything: bool = False, quiet: bool = False, check: Check | None = None) -> None:
+def print_run(
+    run: Run, *, everything: bool = False, quiet: bool = False, check: Check | None = None, note: str = ""
+) -> None:
     """Prints the numbers of a run unless it is to be quiet, those to compare with beside them, and what follows.
 
     A check adds how far each number moves, and its sentence at the end.
@@ -308,6 +309,7 @@ def print_run(run: Run, *, everything: bool = False, quiet: bool = False, check:
         everything: All numbers; else what is asked first.
         quiet: Whether nothing is printed.
         check: What finer runs have found.
+        note: A further sentence.
     """
     from annelid.analysis import summary
     from annelid.draw.summary_table import closing_sentence, duration_for_a_speed, legend, summary_table
@@ -319,8 +321,8 @@ def print_run(run: Run, *, everything: bool = False, quiet: bool = False, check:
         return
     moved = None if check is None else check.cell
     lines = [summary_table(numbers, run.config, everything=everything, moved=moved), legend(numbers, run.config)]
-    lines += [f"warning: {doubt}" for doubt in run.warnings]
-    lines += [closing_sentence(numbers, run.config), "" if check is None else check.sentence]
+    lines += [f"warning: {doubt}" for doubt in numbers.warnings]
+    lines += [closing_sentence(numbers, run.config), "" if check is None else check.sentence, note]
     if not everything:
         folder = shlex.quote(str(run.path.parent))
         duration_s = duration_for_a_speed(numbers)
@@ -355,7 +357,7 @@ def play(
     from annelid.live.show import Show
 
     if (warning := warning_of(host)) is not None:
-        complain(f"warning: {warning}")
+        remark(f"warning: {warning}")
     with Show(worm, host=host, port=free_port(host, port), speed=speed, plots=plots) as show:
         typer.echo(f"{show.address}  (Ctrl-C ends)")
         if open_browser:

@@ -13,6 +13,7 @@ from contextvars import ContextVar
 from io import TextIOWrapper
 from math import isfinite
 from pathlib import Path
+from textwrap import fill
 from typing import Annotated, Any, TextIO
 
 import typer
@@ -49,6 +50,8 @@ OLD_COMMANDS: Mapping[str, tuple[str, ...]] = {
     **{name: ("study", name) for name in ("limit-cycle", "bench", "robustness", "challenge")},
 }
 """What commands of before are now; they go on for one release (docs/roadmap.md lists them)."""
+LINE = 80
+"""Characters of a line of text in the terminal."""
 WIDEST = 200
 """Characters of a command's line in the help, which goes on in the next line and is never cut."""
 
@@ -211,7 +214,7 @@ def _joins(group: typer.Typer, name: str, *, as_json: bool = True, **options: An
 
 def main() -> None:
     """Entry point of the command ``annelid``."""
-    warnings.showwarning = lambda message, *_, **__: complain(f"warning: {message}")
+    warnings.showwarning = lambda message, *_, **__: remark(f"warning: {message}")
     # Further signals end a command in good order; one that the process ignores from its start stays ignored.
     for number in (getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)):
         if signal.getsignal(number) is signal.SIG_DFL:
@@ -305,9 +308,25 @@ def lock(folder: Path, *, new: bool = False) -> None:
     _locks.get().enter_context(locked(folder, new=new))
 
 
-def complain(what: object) -> None:
-    """Writes one line to stderr, whatever the line breaks in it, if stderr can be written."""
+def complain(what: object, command: str = "") -> None:
+    """Writes one line to stderr, whatever the line breaks in it, if stderr can be written.
+
+    Args:
+        what: The line.
+        command: What to type next, on a line of its own.
+    """
+    _write_error(" ".join(str(what).split()) + (f"\n  {command}" if command else ""))
+
+
+def remark(what: object) -> None:
+    """Writes a note or a warning to stderr, which names no command to copy, in lines of `LINE` characters."""
+    _write_error(
+        fill(str(what), LINE - len("annelid: "), break_long_words=False, break_on_hyphens=False, subsequent_indent="  ")
+    )
+
+
+def _write_error(text: str) -> None:
     try:
-        typer.echo(f"annelid: {' '.join(str(what).split())}", err=True)
+        typer.echo(f"annelid: {text}", err=True)
     except OSError:
         _throw_away(sys.stderr)

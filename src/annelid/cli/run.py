@@ -27,7 +27,7 @@ from annelid.cli.common import (
     print_run,
     print_worm,
 )
-from annelid.cli.entry import EXIT_INTERRUPTED, command, complain, end_study, lock
+from annelid.cli.entry import EXIT_INTERRUPTED, command, complain, end_study, lock, remark
 from annelid.cli.json_output import wants_json
 from annelid.errors import ConfigError, RunFileError, SimulationStopped
 
@@ -152,7 +152,7 @@ def run_command(
             "--resume continues a run as it is: give no preset, --segments, --fidelity, --arena, --network"
         )
     for doubt in refuse_nonsense(config):
-        complain(f"warning: {doubt}")
+        remark(f"warning: {doubt}")
     folder = locked_folder(out, config.name)
     print_worm(config, quiet=quiet)
     result, checked = None, None
@@ -175,7 +175,8 @@ def run_command(
                 # Interrupted: the run itself may be done.
                 with suppress(RunFileError):
                     if (left := open_run(folder)).config == config:
-                        print_run(left, quiet=quiet)
+                        missing = "no error bars" if uncertainty is not None else "step and mesh are not checked"
+                        print_run(left, quiet=quiet, note=f"interrupted: {missing}, since finer runs are not done")
                         print_paths([left.path])
                 raise
             done = open_run(folder)
@@ -191,7 +192,7 @@ def run_command(
     print_run(done, quiet=quiet, check=checked)
     if done.status == "interrupted":
         go_on = f"annelid run --resume {shlex.quote(str(folder))}"
-        complain(f"interrupted: what was computed is in {done.path}; continue it with: {go_on}")
+        complain(f"interrupted: what was computed is in {done.path}; continue it with:", go_on)
         raise typer.Exit(EXIT_INTERRUPTED)
     if quiet and not wants_json():
         print_paths([done.path])

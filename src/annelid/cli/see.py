@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from textwrap import fill
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -26,7 +27,7 @@ from annelid.cli.common import (
     runs_from,
     worms_from,
 )
-from annelid.cli.entry import command, lock
+from annelid.cli.entry import LINE, command, lock
 from annelid.cli.json_output import give, refuse_json
 from annelid.errors import ConfigError, RunFileError, suggest
 
@@ -72,7 +73,7 @@ def show_command(
         rows = explained(explain)
         if not give([dict(zip(("row", "name", "meaning"), row, strict=True)) for row in rows]):
             for heading, name, meaning in rows:
-                typer.echo(f"{heading}: {meaning}{f'; in Python and --json {name}' if name else ''}")
+                typer.echo(fill(f"{heading}: {meaning}{f'; in Python and --json {name}' if name else ''}", LINE))
         return
     if run is None:
         raise typer.BadParameter("name a run, such as runs/riddle2023-fast-001: annelid list runs lists them")

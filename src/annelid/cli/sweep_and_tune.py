@@ -18,7 +18,7 @@ from annelid.cli.common import (
     overrides_of,
     print_results,
 )
-from annelid.cli.entry import EXIT_ALL_FAILED, command, complain, end_study, typed_command
+from annelid.cli.entry import EXIT_ALL_FAILED, command, complain, end_study, remark, typed_command
 from annelid.cli.json_output import refuse_json
 
 
@@ -137,7 +137,7 @@ def tune_command(
     changes, objectives = overrides_of(assignments, duration_s=duration), tune.objectives_of(objective or ["speed"])
     base = Case(preset, changes).config
     for doubt in refuse_nonsense(base):
-        complain(f"warning: {doubt}")
+        remark(f"warning: {doubt}")
     task = tune.Task(preset, changes, tune.parsed_variables(vary or [], base), objectives, trials, seed, numerics)
     found: list[tune.Trial] = []
     written: list[Path] = []

@@ -6,7 +6,7 @@ fields of `Sense`, `Switch` or `Pulse`, and the table ``[readout]`` with those o
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, fields, replace
 from math import isfinite, isnan
 from typing import Any, Literal
@@ -153,3 +153,43 @@ class NetworkFile(CircuitKind):
         """Builds the controller, as `ControllerKind.build`, which records all of the network by name."""
         circuit = self.circuit(config, plant.n_segments)
         return OwnCircuitController(circuit, plant.n_muscles, config.clock.control_timestep_s)
+
+
+def differing_networks(configs: Sequence[RunConfig], lacking: Any) -> dict[str, tuple[Any, ...]] | None:
+    """Finds in what networks of worms differ, where one of them is from a file, value by value.
+
+    Args:
+        configs: The worms.
+        lacking: Stands for a value that a network does not have.
+
+    Returns:
+        Values by what they are of, as ``synapse a to b: conductance_uS``; None without a network from a file, or where
+        a controller is no circuit.
+    """
+    kinds = [config.controller for config in configs]
+    if not any(isinstance(kind, NetworkFile) for kind in kinds) or not all(isinstance(k, CircuitKind) for k in kinds):
+        return None
+    # Only a file states thresholds; those of a preset follow from its body.
+    senses = all(isinstance(kind, NetworkFile) and kind.text for kind in kinds)
+    own = [_network_values(config, senses=senses) for config in configs]
+    rows = {name: tuple(one.get(name, lacking) for one in own) for name in dict.fromkeys(n for one in own for n in one)}
+    return {name: values for name, values in rows.items() if any(value != values[0] for value in values)}
+
+
+def _network_values(config: RunConfig, *, senses: bool) -> dict[str, Any]:
+    """All values of a network by what they are of; with ``senses`` also those of senses and readout, of its text."""
+    kind: Any = config.controller
+    tables = network_tables(kind.circuit(config, config.body.n_segments).network)
+    if senses:
+        tables |= {name: one for name, one in parse_toml(kind.text, "the network").items() if name in CIRCUIT_TABLES}
+    values: dict[str, list[Any]] = {}
+    for table, entries in tables.items():
+        for entry in [entries] if isinstance(entries, Mapping) else entries if isinstance(entries, list) else []:
+            own, label = dict(entry), f"{table} {entry.get('name', entry.get('input', ''))}".strip()
+            if table == "connection":
+                label = f"{own.pop('kind')} {own.pop('source')} to {own.pop('target')}"
+            for field, value in own.items():
+                if field not in ("name", "input"):
+                    values.setdefault(f"{label}: {field}", []).append(value)
+    # Several connections of one kind may join the same two neurons.
+    return {name: of_all[0] if len(of_all) == 1 else of_all for name, of_all in values.items()}

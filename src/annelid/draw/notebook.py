@@ -154,7 +154,7 @@ def _numbers(run: Run) -> str:
         f"<tr>{''.join(f'<td {_LEFT}>{_words(cell)}</td>' for cell in row[: len(header)])}</tr>" for row in rows
     )
     head = "".join(f"<th {_LEFT}>{_words(name)}</th>" for name in header)
-    below = [beside, closing_sentence(numbers, run.config), *(f"warning: {doubt}" for doubt in run.warnings)]
+    below = [beside, closing_sentence(numbers, run.config), *(f"warning: {doubt}" for doubt in numbers.warnings)]
     return f"<table><thead><tr>{head}</tr></thead><tbody>{lines}</tbody></table>{''.join(map(_paragraph, below))}"
 
 

@@ -41,7 +41,7 @@ WORDS = {
     "order": "the order in which segments contract, and how many times a wave ran from the first segment to the last",
     "onsets (s)": "the times at which segments begin to contract, in that order",
     "work goes to (%)": "what became of the muscles' net work: stored in the body, lost to slip on the ground, to "
-    "other forces of contacts and constraints, to damping, and to the error of the time step (below 0: it adds energy)",
+    "contacts otherwise, to damping, or to the error of the time step. An error below 0 adds energy",
     "warnings": "what is doubtful about the run, a sentence each",
     COMPARED[0]: f"a published number; with *: that of {FORMULATION}, our run of the paper's own formulation",
     COMPARED[1]: "difference from the reference, in percent of it; of several segments the largest",
@@ -162,10 +162,12 @@ def _rows(numbers: Summary, config: RunConfig, *, everything: bool) -> dict[str,
 def _order(numbers: Summary) -> str:
     if not numbers.order:
         return "no contraction"
+    silent = numbers.rhythm_verdict == "silent"
     if numbers.wave:
         times = f"{numbers.full_cycles} time{'' if numbers.full_cycles == 1 else 's'}"
-        return f"{_dashed(range(1, numbers.n_segments + 1))}, {times}"
-    return f"{_dashed(numbers.order)}, {'too short to judge' if numbers.wave is None else 'no wave'}"
+        return f"{_dashed(range(1, numbers.n_segments + 1))}, {times}{', then none' if silent else ''}"
+    last = "then none" if silent else "too short to judge" if numbers.wave is None else "no wave"
+    return f"{_dashed(numbers.order)}, {last}"
 
 
 def _dashed(segments: Sequence[int]) -> str:
@@ -189,6 +191,8 @@ def duration_for_a_speed(numbers: Summary) -> int | None:
     onsets_s = numbers.onsets_s
     if numbers.speed_m_per_s is not None or numbers.travel_m is None or len(onsets_s) < 2:
         return None
+    if numbers.rhythm_verdict == "silent":
+        return None
     period_s = numbers.period_s or numbers.n_segments * (onsets_s[-1] - onsets_s[0]) / (len(onsets_s) - 1)
     duration_s = ceil(onsets_s[0] + _CYCLES_FOR_A_SPEED * period_s)
     return duration_s if duration_s > onsets_s[0] + (numbers.duration_s or 0.0) else None
@@ -196,6 +200,8 @@ def duration_for_a_speed(numbers: Summary) -> int | None:
 
 def _why_no_speed(numbers: Summary) -> str:
     duration_s = duration_for_a_speed(numbers)
+    if numbers.rhythm_verdict == "silent":
+        return "none: the rhythm stops"
     return "needs two cycles" + (f", better four: --duration {duration_s}" if duration_s else "")
 
 
@@ -209,7 +215,7 @@ def _shares_of_the_work(numbers: Summary) -> str:
         "slip": numbers.energy_slip_J,
         "contact": numbers.energy_constraints_J,
         "damping": numbers.energy_damping_J,
-        "step": numbers.energy_numerical_J,
+        "step error": numbers.energy_numerical_J,
     }
     return ", ".join(f"{name} {100 * part / work:z.0f}" for name, part in parts.items() if part is not None)
 
@@ -273,21 +279,29 @@ def _blocks(n_runs: int) -> list[list[int]]:
 
 
 def fields_table(comparison: Comparison) -> str:
-    """Returns the fields in which the configurations differ; of worms of different kinds only those that all have."""
-    other_kinds = "body.kind" in comparison.fields
+    """Returns the fields in which configurations and networks differ; of different kinds only those that all have."""
+    kinds = tuple(field.removesuffix("kind") for field in comparison.fields if field.endswith(".kind"))
+    parted = (*kinds, "arena.") if "body." in kinds else kinds
+    left_out = [field for field, one in comparison.fields.items() if field.startswith(parted) and LACKING in one]
+    network = comparison.network
+    if network is not None:
+        left_out.append("controller.text")
     fields = {
         field: ["not set" if one is None else UNKNOWN if one is LACKING else toml_value(one) for one in values]
-        for field, values in comparison.fields.items()
-        if not (other_kinds and field.startswith(("body.", "arena.")) and LACKING in values)
+        for field, values in {**comparison.fields, **(network or {})}.items()
+        if field not in left_out
     }
     widest = max(map(len, fields), default=0)
     blocks = []
-    for shown in _blocks(len(comparison.labels)):
+    for shown in _blocks(len(comparison.labels)) if fields else []:
         most = max((WIDTH - widest) // len(shown) - 4, 6)
         lines = [[field, *(shortened(values[i], most) for i in shown)] for field, values in fields.items()]
         blocks.append(aligned([["", *(str(i + 1) for i in shown)], *lines]))
-    if other_kinds:
-        blocks.append("worms of different kinds: of body and arena only fields that all have; --json lists all")
+    if network == {}:
+        blocks.append("the networks are the same")
+    if any(field != "controller.text" for field in left_out):
+        named = listed(sorted({field.partition(".")[0] for field in left_out}))
+        blocks.append(f"different kinds of {named}: only fields that all have; --json lists all")
     return "\n\n".join(blocks)
 
 
@@ -323,12 +337,14 @@ def closing_sentence(numbers: Summary, config: RunConfig) -> str:
     if not references(config, numbers.controller):
         return _about_the_rhythm(numbers)
     preset, changed = changed_fields(config)
-    if changed:
-        return f"differs from {preset} in {listed(changed)}; references are of the unchanged worm"
-    if not stands_for_the_papers(config, numbers.controller):
+    of_papers = stands_for_the_papers(config, numbers.controller)
+    said = [f"differs from {preset} in {listed(changed)}; references are of the unchanged worm"] if changed else []
+    if of_papers and config.body.has_rigid_crossings:
+        said.append(_about_rigid_crossings(numbers))
+    if said:
+        return "\n".join(said)
+    if not of_papers:
         return _about_the_rhythm(numbers)
-    if config.body.has_rigid_crossings:
-        return _about_rigid_crossings(numbers)
     apart, within = _apart_from_the_papers(numbers), f"within {100 * ELONGATION_WITHIN:g} %"
     if apart:
         return f"{config.name} does not reproduce the paper's formulation {within}: {', '.join(apart)}"
@@ -337,12 +353,10 @@ def closing_sentence(numbers: Summary, config: RunConfig) -> str:
 
 def _about_the_rhythm(numbers: Summary) -> str:
     reason, verdict, stride_m = numbers.rhythm_reason, numbers.rhythm_verdict, numbers.stride_m
-    if reason is None:
-        return ""
+    if reason is None or verdict == "silent":
+        return ""  # A warning says that.
     said = f"the segments contract out of order: {reason}"
-    if verdict == "silent":
-        said = f"the rhythm stops: {reason}"
-    elif numbers.wave:
+    if numbers.wave:
         said = "the segments contract one after the other from front to rear"
     elif verdict != "disordered":
         said = f"the segments contract in {reason}" if verdict else "the run is too short to judge the order"
@@ -382,7 +396,7 @@ def _about_rigid_crossings(numbers: Summary) -> str:
     shares = _listed(relative_difference(formulation().elongation_mean_max_m, numbers.elongation_mean_max_m))
     mean = _mean(shares) if numbers.period_s else None
     times = "farther than" if mean is None else f"{1.0 + mean:.1f} times as far as"
-    return f"crossings are rigid: segments elongate {times} those of {FORMULATION}"
+    return f"crossings of strands are rigid: segments elongate {times} those of {FORMULATION}"
 
 
 def _signed(percent: float) -> str:

@@ -189,7 +189,7 @@ class Store:
         refused: dict[int, ConfigError] = {}
         failed: dict[str, Exception] = {}
         for i, case in enumerate(cases):
-            (progress or self.progress)("checking the runs", i, len(cases), i / len(cases))
+            (progress or self.progress)("checking the settings", i, len(cases), i / len(cases))
             try:
                 refuse_nonsense(case.config)
             except ConfigError as error:

@@ -384,26 +384,30 @@ def shown_numbers(sweep: Sweep) -> list[str]:
 
 
 def _drawn(data: xr.Dataset, names: Sequence[str]) -> xr.Dataset:
-    """Numbers to draw, those per segment as their mean over the segments."""
+    """Numbers to draw, as a run's table has them, those per segment as their mean over the segments."""
     chosen = data[[*names, "status"]]
     for name in names:
-        if SEGMENT in chosen[name].dims:
-            chosen[name] = chosen[name].mean(SEGMENT, keep_attrs=True).assign_attrs(of=", mean of segments")
+        number, values, of = NUMBERS[name], chosen[name], ""
+        if SEGMENT in values.dims:
+            values, of = values.mean(SEGMENT), ", mean of segments"
+        heading = (number.heading if number.label else worded(name, number.unit)) + of
+        chosen[name] = (number.factor * values).assign_attrs(heading=heading)
     return chosen
 
 
 def results_table(sweep: Sweep) -> Table:
     """Returns the runs with the highest and the lowest values of the first number, and those that failed and why."""
     plan, names = sweep.plan, shown_numbers(sweep)
-    content = f"highest and lowest {names[0]}" if names else "no number has a value"
+    drawn = _drawn(sweep.data, names)
+    content = f"highest and lowest {drawn[names[0]].heading}" if names else "no number has a value"
     table = Table(title=f"{plan.study.name}: {content}", caption=_caption(sweep.rows))
-    heads = [worded(name.rsplit(".", 1)[-1], sweep.data[name].attrs["units"]) for name in (*plan.fields, *names)]
+    heads = [worded(field.rsplit(".", 1)[-1], sweep.data[field].attrs["units"]) for field in plan.fields]
+    heads += [drawn[name].heading for name in names]
     varied = [*plan.fields, *(["seed"] if REPEAT in plan.levels else [])]
     heads[len(plan.fields) : len(plan.fields)] = [REPEAT] if REPEAT in plan.levels else []
     for head in ("run", *heads):
         table.add_column(head, justify="right")
     if names:
-        drawn = _drawn(sweep.data, names)
         numbers = pd.DataFrame({name: drawn[name].values.ravel() for name in names})
         order = numbers.dropna(subset=names[:1]).sort_values(names[0], ascending=False, kind="stable").index
         for rows in [order] if len(order) <= 2 * N_ENDS else [order[:N_ENDS], order[-N_ENDS:]]:

@@ -16,11 +16,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from rich.table import Table
 
-from annelid.analysis import NUMBERS, three_digits
+from annelid.analysis import NUMBERS
 from annelid.config import RunConfig, Vary, field_value, fields_of, load_config, parse_assignments, toml_value
 from annelid.config.checking import check_section
 from annelid.draw.figures.experiments import pareto_figure, progress_figure
-from annelid.draw.figures.sweep import worded
 from annelid.errors import ConfigError, MissingDependency, suggest
 from annelid.experiment.case import Case, write_worm
 from annelid.experiment.gait_criteria import Judged, judge
@@ -78,8 +77,8 @@ gait that advances: no speed, and a cost and a slip beyond reach."""
 
 
 def labelled(name: str) -> str:
-    """Writes the name of a number in words, with its unit in brackets."""
-    return worded(name, NUMBERS[name].unit)
+    """Returns what a run's table calls a number, with its unit."""
+    return NUMBERS[name].heading
 
 
 def objectives_of(names: list[str]) -> list[Objective]:
@@ -355,7 +354,7 @@ def write_gait(task: Task, trial: Trial, command: str, path: Path) -> Path:
         f"Tuned by: {command} ({task.n_trials} trials, seed {task.seed})",
         f"Trial {trial.name}:",
         *(
-            f"  {labelled(name)}: {three_digits(one)}"
+            f"  {labelled(name)}: {NUMBERS[name].text(one)}"
             for name, one in zip(SHOWN, trial.numbers, strict=True)
             if one is not None
         ),
@@ -378,7 +377,7 @@ def results_table(task: Task, trials: Sequence[Trial]) -> Table:
     for trial in shown:
         table.add_column(trial.name, justify="right")
     for name, *values in zip(SHOWN, *(trial.numbers for trial in shown), strict=True):
-        table.add_row(labelled(name), *("" if one is None else three_digits(one) for one in values))
+        table.add_row(labelled(name), *map(NUMBERS[name].text, values))
     table.add_section()
     fields = [variable.field for variable in task.variables]
     for row in zip(fields, *(trial.settings(task) for trial in shown), strict=True):
@@ -388,8 +387,14 @@ def results_table(task: Task, trials: Sequence[Trial]) -> Table:
 
 def _figure(task: Task, trials: Sequence[Trial], stem: Path) -> Path:
     first, *others = objectives = task.objectives
-    values = [[nan] * len(objectives) if one.judged.problem else one.scores(objectives) for one in trials]
+    values = [[nan] * len(objectives) if one.judged.problem else _shown(one, objectives) for one in trials]
     if not others:
         return progress_figure([value for (value,) in values], labelled(first.number), first.more_is_better, stem)
-    on_front = {one.name: one.scores(objectives) for one in front(trials, objectives)}
+    on_front = {one.name: _shown(one, objectives) for one in front(trials, objectives)}
     return pareto_figure(values, on_front, [labelled(one.number) for one in objectives], first.more_is_better, stem)
+
+
+def _shown(trial: Trial, objectives: Sequence[Objective]) -> list[float]:
+    """Scores in the units of a run's table."""
+    factors = (NUMBERS[one.number].factor for one in objectives)
+    return [factor * score for factor, score in zip(factors, trial.scores(objectives), strict=True)]

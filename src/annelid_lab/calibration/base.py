@@ -21,6 +21,8 @@ Found = Mapping[str, Array]
 """Arrays that a test of a worm gives, by name."""
 FEWEST = 8
 """Points that an experiment must have."""
+MOST_HELD = 0.8
+"""Share of the points that may be held out."""
 OFF_SCALE = 20.0
 """Data that are so many times as large or as small as the worm's have another unit than their columns say."""
 UNITS = {"Pa": ((1e9, "GPa"), (1e6, "MPa")), "m": ((1e-3, "mm"),)}
@@ -75,6 +77,9 @@ class Experiment(Kind):
     hold_out: tuple[tuple[Share, Share], ...] = Field(
         default=(), description="parts of the points, in order from 0 to 1, that are predicted and not fitted"
     )
+    set: Mapping[str, Any] = Field(
+        default_factory=dict, description="fields of the worm that differ in this experiment, as a payload or the floor"
+    )
 
     @abstractmethod
     def read(self, folder: Path) -> Data:
@@ -84,6 +89,24 @@ class Experiment(Kind):
             ConfigError: They lie elsewhere, or have no such column or another unit.
             UnreadableText: They cannot be read.
         """
+
+    def place(self, data: Data) -> Array:
+        """Place of each point in the order of the measurement, from 0 to 1, ``(n,)``."""
+        return (np.arange(len(data.at)) + 0.5) / len(data.at)
+
+    def held(self, data: Data) -> np.ndarray:
+        """Which points are held out, ``(n,)``.
+
+        Raises:
+            ConfigError: Too few are left.
+        """
+        place = self.place(data)
+        held = np.zeros(len(place), dtype=bool)
+        for low, high in self.hold_out:
+            held |= (place >= low) & (place < high)
+        if held.sum() > MOST_HELD * len(held):
+            raise ConfigError(f"experiments.{self.name}.hold_out leaves {(~held).sum()} of {len(held)} points to fit")
+        return held
 
     def test(self, config: RunConfig, data: Data) -> Test | None:
         """Returns what has to be simulated; None where a closed form predicts the points."""

@@ -16,10 +16,13 @@ UNKNOWN = 0.3
 """Relative error of a combination of parameters above which the data do not determine it."""
 ALIKE = 0.9
 """Correlation above which two parameters are not told apart."""
-WRONG = 2.0
-"""How many times as far as noise and scatter explain points lie from a model that lacks something."""
+WRONG = 1.25
+"""How many times as far as noise and scatter explain points lie from a model that lacks something: three standard
+errors, of the rms of 180 points and of a noise that is estimated from 800 samples."""
 LEAST_WRONG = 0.01
 """Of the standard deviation of the points: what is less does not matter."""
+UNLIKE = 0.5
+"""Rms of a fit, of the standard deviation of the points, above which they are those of another robot."""
 
 
 def doubts(fit: Fit, known: Intervals) -> tuple[str, ...]:
@@ -70,15 +73,23 @@ def confused(names: Sequence[str], correlation: Array, errors: Array, directions
 
 
 def _lacking(part: Part) -> list[str]:
-    """Says that the points lie farther from the model than noise and the scatter of worms explain."""
+    """Says that the points are those of another robot, or lie farther from the model than noise and scatter explain."""
+    means = np.bincount(part.data.series, part.data.values) / np.maximum(np.bincount(part.data.series), 1)
+    changes = float(np.sqrt(((part.data.values - means[part.data.series]) ** 2).mean()))
+    factor, unit = shown_in(part.data.unit, part.rms)
+    if part.rms > UNLIKE * changes:
+        return [
+            f"the fitted worm lies {part.rms / factor:.2g}{unit} from the points (rms), which change by "
+            f"{changes / factor:.2g}{unit} (standard deviation): are they of another robot or gait, or is a signal "
+            "another one than the map says?"
+        ]
     if part.floor is None:
         return []
     explained = float(np.sqrt((part.floor**2 + np.diag(part.scatter)).mean()))
-    if part.rms <= max(WRONG * explained, LEAST_WRONG * float(np.std(part.data.values))):
+    if part.rms <= max(WRONG * explained, LEAST_WRONG * changes):
         return []
-    factor, unit = shown_in(part.data.unit, part.rms)
     return [
-        f"the fitted worm lies {part.rms / factor:.2g}{unit} from the points (rms), where noise explains "
-        f"{explained / factor:.2g}{unit}: the model lacks something, or the sensors drift; compare signal by signal "
+        f"the fitted worm lies {part.rms / factor:.2g}{unit} from the points (rms), where noise and scatter explain "
+        f"{explained / factor:.2g}{unit}. The model lacks something, or the sensors drift. Compare signal by signal "
         "with `annelid compare`, measure single segments in a load frame, or free a further parameter"
     ]

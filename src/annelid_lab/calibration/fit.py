@@ -31,6 +31,8 @@ REACH = 4.0
 """Radius of the last region in standard errors, beside what the scatter of worms asks for."""
 CLEAR = 3.0
 """How many times as far as worms scatter a parameter must move the points in the last region."""
+ROUGH = 0.5
+"""Share of their scatter in the region before, above which worms scatter whatever the region."""
 LAST, SMOOTH = 4, 0.3
 """Worms in the last region, of the terms of the emulator; few are enough where they scatter less, in standard
 deviations of the residuals."""
@@ -183,7 +185,7 @@ class Fit:
 def inverse(information: Array) -> Array:
     """Returns the covariance, ``(p, p)``, that belongs to an information, huge where there is none."""
     values, vectors = np.linalg.eigh(information)
-    return (vectors / np.maximum(values, SINGULAR * values[-1])) @ vectors.T
+    return (vectors / np.maximum(values, SINGULAR * max(values[-1], 1.0))) @ vectors.T
 
 
 def points_at(data: Data, rows: np.ndarray) -> Data:
@@ -277,7 +279,7 @@ def _searched(model: Model, best: Tried, first: float) -> tuple[Tried, Emulator]
     is_moving = np.isin(np.arange(len(model.start)), moving)
     centre, radius = best.logs, np.where(is_moving, first, np.inf)
     draw = qmc.Halton(max(len(moving), 1), rng=2026)
-    last, was_fine, wanted = not moving, False, 2 * quadratic
+    last, was_fine, wanted, before = not moving, False, 2 * quadratic, np.full(len(model.start), np.inf)
     for _ in range(MOST_REGIONS):
         low, high = np.maximum(centre - radius, model.low), np.minimum(centre + radius, model.high)
         inside = [one for one in model.tried if (np.abs(one.logs - centre) <= radius)[moving].all()]
@@ -294,12 +296,19 @@ def _searched(model: Model, best: Tried, first: float) -> tuple[Tried, Emulator]
         model.run([optimum])
         best = _best(model, plain(model, best), replace(best, logs=model.with_untested(best, optimum).logs))
         share, clear, known = _goal(model, emulator, best)
-        is_open = known >= radius
+        # A region in which worms scatter too much to show any slope is too wide.
+        is_open = (known >= radius) & bool(share <= 1.0 or (known < radius)[moving].any())
         goal = clear + known
-        # Once an emulator is as good as the fit, one smaller region shows whether its scatter is that of any worm.
-        last = bool(is_open[moving].all() or (share <= 1.0 and (was_fine or (goal <= radius)[moving].all())))
-        was_fine = share <= 1.0
-        edge = np.abs(best.logs - centre) > 0.8 * radius
+        # Scatter that hardly falls with the region is that of any worm. Once an emulator is as good as the fit, one
+        # smaller region shows whether it is.
+        is_rough = bool((clear > ROUGH * before)[moving].all())
+        is_small = bool((goal <= radius)[moving].all())
+        edge = ~is_open & (np.abs(best.logs - centre) > 0.8 * radius)
+        is_fine = share <= 1.0
+        last = not edge.any() and bool(
+            is_open[moving].all() or (is_fine and was_fine) or (is_small and (is_fine or is_rough))
+        )
+        was_fine, before = is_fine, clear
         centre = best.logs
         goal = np.clip(goal, radius * SHRINK**2, radius) if last else np.where(is_open, radius, radius * SHRINK)
         radius = np.where(is_moving, np.where(edge, radius, goal), np.inf)
@@ -393,7 +402,7 @@ def _finish(fit: Fit, low: Array, high: Array) -> list[Array]:
 def _fit_of(
     model: Model, emulator: Emulator, best: Tried, middle: Array, noises: Sequence[Noise], scatter: Sequence[Array]
 ) -> Fit:
-    experiments = model.worms(best.logs)[1]
+    experiments = [one for _, one in model.worms(best.logs)]
     fitted, smooth = model.measured(best), emulator.predicted(middle)
     slopes = emulator.derivatives(middle)
     floors = [one.noise_floor(data) for one, data in zip(experiments, model.data, strict=True)]

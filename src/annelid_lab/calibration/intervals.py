@@ -51,7 +51,7 @@ def intervals(fit: Fit, model: Model) -> Intervals:
     error = np.sqrt(np.diag(fit.covariance))
     values, vectors = np.linalg.eigh(fit.information)
     correlation = fit.covariance / np.outer(error, error)
-    errors = 1.0 / np.sqrt(np.maximum(values, SINGULAR * values[-1]))
+    errors = 1.0 / np.sqrt(np.maximum(values, SINGULAR * max(values[-1], 1.0)))
     return Intervals(
         profile=_profile(fit, model, error, quantile),
         relative_error=error,

@@ -7,7 +7,7 @@ the parameters, sample by sample (least squares); how far they scatter about it 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -18,7 +18,7 @@ import numpy as np
 from annelid.config import RunConfig, check_section, load_config
 from annelid.errors import ConfigError
 from annelid.protocols import Array
-from annelid_lab.calibration.base import Data, Experiment, Found
+from annelid_lab.calibration.base import Experiment, Found
 from annelid_lab.calibration.simulations import Simulations
 from annelid_lab.calibration.study import IdentifyStudy
 
@@ -26,6 +26,8 @@ NUDGE = 0.01
 """Relative change that shows whether a test depends on a parameter."""
 STEP = 1e-3
 """Relative step of the derivatives of an emulator, which is smooth."""
+EFFECT = 4.0
+"""Least F ratio of a parameter's terms in an emulator: what moves worms less than they scatter is left out."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +61,7 @@ class Model:
         """Reads the data of a study in a folder."""
         self.study, self.simulations, self.worm = study, simulations, study.worm(folder)
         self.data = [one.read(folder) for one in study.experiments]
-        self.rows = [held_out(one, data) for one, data in zip(study.experiments, self.data, strict=True)]
+        self.rows = [one.held(data) for one, data in zip(study.experiments, self.data, strict=True)]
         n_fitted = sum(int((~held).sum()) for held in self.rows)
         if n_fitted <= len(study.parameters):
             raise ConfigError(f"{n_fitted} points cannot fit {len(study.parameters)} parameters")
@@ -81,8 +83,8 @@ class Model:
         ]
         self.moving = sorted({i for own in self.active for i in own})
 
-    def worms(self, logs: Array) -> tuple[RunConfig, list[Experiment]]:
-        """Returns the worm and the experiments for logarithms of the parameters, ``(p,)``."""
+    def worms(self, logs: Array) -> list[tuple[RunConfig, Experiment]]:
+        """Returns every experiment with its worm for logarithms of the parameters, ``(p,)``."""
         changes: dict[str, float] = {}
         for fields, value in zip(self._fields, np.exp(logs).tolist(), strict=True):
             changes |= {path: share * value for path, share in fields.items()}
@@ -91,9 +93,13 @@ class Model:
             {p.rsplit(".", 1)[1]: v for p, v in changes.items() if p.startswith(f"experiments.{one.name}.")}
             for one in self.study.experiments
         ]
-        config = load_config(self.worm.model_dump(exclude_none=True), worm)
-        return config, [
-            check_section(type(one), one.model_dump() | its) if its else one
+        base = self.worm.model_dump(exclude_none=True)
+        same = load_config(base, worm)
+        return [
+            (
+                load_config(base, {**one.set, **worm}) if one.set else same,
+                check_section(type(one), one.model_dump() | its) if its else one,
+            )
             for one, its in zip(self.study.experiments, own, strict=True)
         ]
 
@@ -101,8 +107,8 @@ class Model:
         """Computes the tests of several worms, all at once, and keeps them; None for a worm that gives way."""
         wanted = []
         for logs in many:
-            config, experiments = self.worms(logs)
-            wanted += [(one.test(config, data), config) for one, data in zip(experiments, self.data, strict=True)]
+            pairs = zip(self.worms(logs), self.data, strict=True)
+            wanted += [(one.test(config, data), config) for (config, one), data in pairs]
         done = iter(self.simulations.compute([(t, c) for t, c in wanted if t is not None], stage))
         results = [{} if test is None else next(done) for test, _ in wanted]
         n, given = len(self.data), list[Tried | None]()
@@ -114,10 +120,8 @@ class Model:
 
     def predicted(self, logs: Array, found: Sequence[Found]) -> list[Array]:
         """Predicts all points of a worm from what its tests gave."""
-        config, experiments = self.worms(logs)
-        return [
-            one.predicted(config, data, what) for one, data, what in zip(experiments, self.data, found, strict=True)
-        ]
+        each = zip(self.worms(logs), self.data, found, strict=True)
+        return [one.predicted(config, data, what) for (config, one), data, what in each]
 
     def measured(self, one: Tried) -> list[Array]:
         """Predicts all points of a worm that was computed."""
@@ -134,9 +138,12 @@ class Model:
 
     def _asked(self, logs: Array) -> list[tuple[str, str] | None]:
         """What the tests of a worm depend on; None where there is no test."""
-        config, experiments = self.worms(logs)
-        tests = [one.test(config, data) for one, data in zip(experiments, self.data, strict=True)]
-        return [None if test is None else (repr(test), config.model_dump_json()) for test in tests]
+        worms = self.worms(logs)
+        tests = [one.test(config, data) for (config, one), data in zip(worms, self.data, strict=True)]
+        return [
+            None if test is None else (repr(test), config.model_dump_json())
+            for test, (config, _) in zip(tests, worms, strict=True)
+        ]
 
 
 class Emulator:
@@ -152,29 +159,47 @@ class Emulator:
             radius: Of the region, ``(p,)``.
         """
         self.model, self.used, self.centre, self.radius = model, used, centre, radius
-        self._fits: list[tuple[int, dict[str, Array]]] = []
+        self._fits: list[tuple[list[int], int, Mapping[str, Any]]] = []
         self.spare = len(used)
+        points = [model.measured(model.with_untested(one, centre)) for one in used]
         for e, active in enumerate(model.active):
             order = 2 if len(used) >= n_terms(len(active), 2) + 2 else int(len(used) > len(active) + 1)
-            terms = np.stack([self._terms(one.logs, e, order) for one in used])
+            values = {
+                name: np.stack([one.found[e][name].ravel() for one in used])
+                for name, first in used[0].found[e].items()
+                if first.dtype.kind == "f"
+            }
+            kept = [i for i in active if self._moves(np.stack([one[e] for one in points]), active, i, order)]
+            terms = self._design(kept, order)
             self.spare = min(self.spare, len(used) - terms.shape[1])
-            fits = {}
-            for name, first in used[0].found[e].items():
-                if first.dtype.kind == "f":
-                    values = np.stack([one.found[e][name].ravel() for one in used])
-                    fits[name] = np.linalg.lstsq(terms, values, rcond=None)[0]
-            self._fits.append((order, fits))
+            fits = {name: np.linalg.lstsq(terms, one, rcond=None)[0] for name, one in values.items()}
+            self._fits.append((kept, order, fits))
 
-    def _terms(self, logs: Array, e: int, order: int) -> Array:
-        z = ((logs - self.centre) / self.radius)[self.model.active[e]]
+    def _moves(self, points: Array, active: list[int], i: int, order: int) -> bool:
+        """Whether a parameter moves the points of worms, ``(m, n)``, farther than they scatter."""
+        whole, less = (self._design(some, order) for some in (active, [other for other in active if other != i]))
+        if (spare := len(points) - whole.shape[1]) < 1:
+            return True
+        scatter, both = (
+            float(((points - terms @ np.linalg.lstsq(terms, points, rcond=None)[0]) ** 2).sum())
+            for terms in (whole, less)
+        )
+        return both - scatter > EFFECT * (whole.shape[1] - less.shape[1]) * scatter / spare
+
+    def _design(self, active: list[int], order: int) -> Array:
+        """Terms of all worms, ``(m, k)``."""
+        return np.stack([self._terms(one.logs, active, order) for one in self.used])
+
+    def _terms(self, logs: Array, active: list[int], order: int) -> Array:
+        z = ((logs - self.centre) / self.radius)[active]
         rows, columns = np.triu_indices(len(z))
         return np.concatenate([[1.0], *([z] if order else []), *([z[rows] * z[columns]] if order > 1 else [])])
 
     def predicted(self, logs: Array) -> list[Array]:
         """Predicts all points of a worm."""
         found: list[Found] = []
-        for e, (order, fits) in enumerate(self._fits):
-            first, terms = self.used[0].found[e], self._terms(logs, e, order)
+        for e, (kept, order, fits) in enumerate(self._fits):
+            first, terms = self.used[0].found[e], self._terms(logs, kept, order)
             found.append({n: (terms @ fits[n]).reshape(one.shape) if n in fits else one for n, one in first.items()})
         return self.model.predicted(logs, found)
 
@@ -194,9 +219,9 @@ class Emulator:
             for one in self.used
         ]
         leverage = np.zeros(len(self.used))
-        for e, (order, fits) in enumerate(self._fits):
+        for kept, order, fits in self._fits:
             if fits:
-                terms = np.stack([self._terms(one.logs, e, order) for one in self.used])
+                terms = self._design(kept, order)
                 leverage = np.maximum(leverage, np.diag(terms @ np.linalg.pinv(terms)))
         return [np.stack(own) for own in zip(*rows, strict=True)], leverage
 
@@ -208,14 +233,3 @@ class Emulator:
 def n_terms(variables: int, order: int) -> int:
     """How many terms a polynomial has."""
     return 1 + variables + (variables * (variables + 1) // 2 if order > 1 else 0)
-
-
-def held_out(experiment: Experiment, data: Data) -> np.ndarray:
-    """Which points of an experiment are held out, ``(n,)``."""
-    place = (np.arange(len(data.at)) + 0.5) / len(data.at)
-    held = np.zeros(len(place), dtype=bool)
-    for low, high in experiment.hold_out:
-        held |= (place >= low) & (place < high)
-    if held.sum() > 0.8 * len(held):
-        raise ConfigError(f"experiments.{experiment.name}.hold_out leaves {(~held).sum()} of {len(held)} points to fit")
-    return held

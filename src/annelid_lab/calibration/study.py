@@ -119,6 +119,12 @@ class IdentifyStudy(Section):
                 )
             if not any(self.paths(field) for field in one.fields):
                 raise ValueError(f"parameters.{name}: no experiment has one of its fields: {', '.join(one.fields)}")
+        fitted = {path for one in self.parameters.values() for field in one.fields for path in self.paths(field)}
+        for one in self.experiments:
+            if both := fitted & {whole_path(field, {}) for field in one.set}:
+                raise ValueError(
+                    f"experiments.{one.name}.set: {shown(min(both))} is fitted by a parameter; leave one of the two out"
+                )
         return self
 
     def paths(self, field: str) -> list[str]:

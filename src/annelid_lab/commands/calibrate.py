@@ -15,12 +15,12 @@ from annelid.cli import (
     Output,
     Quiet,
     command,
-    complain,
     kept_runs,
     overrides_of,
     print_paths,
     print_results,
     refuse_existing,
+    remark,
 )
 
 
@@ -89,7 +89,7 @@ def calibrate_command(
     with kept_runs(output, jobs=jobs, quiet=quiet) as store:
         refuse_existing(output / REPORT, force)
         simulations = Simulations(store.folder, store.executor, store.progress)
-        found = identify(loaded, source.parent, simulations, lambda note: complain(f"note: {note}"))
+        found = identify(loaded, source.parent, simulations, lambda note: remark(f"note: {note}"))
     for sentence in found.warnings:
-        complain(f"warning: {sentence}")
+        remark(f"warning: {sentence}")
     print_results(write_identified(found, output), *tables(found), quiet=quiet)

@@ -8,8 +8,26 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from annelid.cli import Force, command, complain, give, lock, play, print_paths, refuse_existing, runs_from
+from annelid.cli import (
+    Force,
+    command,
+    complain,
+    config_of,
+    give,
+    lock,
+    locked_folder,
+    names_worm,
+    play,
+    print_paths,
+    refuse_existing,
+    remark,
+    runs_from,
+    wants_json,
+)
 from annelid.errors import ConfigError, RunFileError
+
+ANIMALS = "earthworm"
+"""Stands for the animals and published robots, unless a run has this name."""
 
 
 @command("compare", "Robot")
@@ -20,7 +38,8 @@ def compare_command(
             metavar="RUN RUN..",
             autocompletion=runs_from,
             show_default=False,
-            help="Folders of runs, or their run.nc; differences are to the first. With --map: a run and a log.",
+            help="Folders of runs, or their run.nc; differences are to the first. With --map: a run and a log. Before"
+            " `earthworm` also presets.",
         ),
     ] = None,
     log_map: Annotated[
@@ -56,10 +75,15 @@ def compare_command(
     annelid compare --map-for robot.csv > robot.toml
     annelid compare runs/wang-001 robot.csv --map robot.toml -o robot
     annelid compare runs/wang-001 robot.csv --map robot.toml --view
+    annelid compare runs/wang-001 earthworm -o animals   beside animals
+    annelid compare crawler-servo earthworm              runs the preset first
 
     With --map the second file is a measured log: CSV, Parquet, MATLAB, netCDF, or the points of a video tracker. Run
     and log are aligned in time. The table has error, amplitude, phase and duty of every signal, and -o adds
     agreement.json and agreement.png. docs/how_to/measured_data.md describes the map and the numbers.
+
+    The last word `earthworm` puts runs, or presets that it runs first, beside an earthworm, a fly larva and published
+    robots: speed, stride, frequency, anchored share, with sources. -o adds earthworm.json and earthworm.png.
     """
     runs = runs or []
     if map_for is not None:
@@ -77,6 +101,9 @@ def compare_command(
         return
     if view:
         raise typer.BadParameter("--view needs --map: annelid view RUN plays a run alone")
+    if runs and str(runs[-1]) == ANIMALS and not runs[-1].exists():
+        _compare_animals(runs[:-1], output, force=force)
+        return
     from annelid.analysis import compare
     from annelid.draw import comparison_table, fields_table, lengths_figure, travel_figure
     from annelid.output import write_json
@@ -97,6 +124,8 @@ def compare_command(
         typer.echo(comparison_table(comparison, everything=everything))
         typer.echo(f"\n{fields_table(comparison) if comparison.fields else 'the configurations are the same'}")
     if output is None:
+        if not wants_json():
+            typer.echo("next: all numbers with --all, figures of the runs with -o FOLDER")
         return
     written = [write_json(output / "comparison.json", comparison.to_dict())]
     for name, draw in figures.items():
@@ -105,6 +134,36 @@ def compare_command(
         except RunFileError as error:
             complain(f"{name} not drawn: {error}")
     print_paths(written)
+
+
+def _compare_animals(worms: list[Path], output: Path | None, *, force: bool) -> None:
+    from annelid.output import write_json
+    from annelid.simulation import Run, open_run, simulate
+    from annelid_lab.animals import animals_picture, animals_record, animals_table, limits, published, subject_of
+
+    if output is not None:
+        lock(output)
+        for suffix in ("json", "png"):
+            refuse_existing(output / f"{ANIMALS}.{suffix}", force)
+    runs: list[Run] = []
+    for worm in worms:
+        if not names_worm(str(worm)):
+            runs.append(open_run(worm))
+            continue
+        config = config_of(str(worm), {})
+        runs.append(simulate(config, locked_folder(None, config.name)))
+        complain(f"{worm}: run in {runs[-1].path}")
+    own = [subject_of(run, run.path.absolute().parent.name) for run in runs]
+    for one in own:
+        if not one.numbers:
+            remark(f"note: {one.name} has no complete cycle behind its first one: run it longer, with --duration")
+    subjects = [*own, *published()]
+    sentences = list(dict.fromkeys(filter(None, map(limits, runs))))
+    record = {**animals_record(subjects), "limits": sentences}
+    if not give(record):
+        typer.echo("\n\n".join([animals_table(subjects), *sentences]))
+    if output is not None:
+        print_paths([write_json(output / f"{ANIMALS}.json", record), animals_picture(subjects, output / ANIMALS)])
 
 
 def _propose_map(run: Path, log: Path) -> NoReturn:
@@ -141,7 +200,7 @@ def _compare_measured(
     if not give(found.to_dict()):
         typer.echo(agreement_table(found))
     for note in found.notes:
-        complain(f"note: {note}")
+        remark(f"note: {note}")
     if output is not None:
         print_paths([write_json(output / "agreement.json", found.to_dict())])
         print_paths([agreement_figure(found, output / "agreement")])

@@ -11,7 +11,7 @@ from annelid.cli import Assignments, Force, Segments, command, config_of, overri
 from annelid.errors import shown, suggest
 
 
-@command("export-network", "")
+@command("export-network", "Exchange")
 def export_network_command(
     source: Annotated[
         str,

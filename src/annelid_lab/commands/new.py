@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from annelid.cli import Force, command, complain, print_paths, refuse_existing
+from annelid.cli import Force, command, print_paths, refuse_existing, remark, wants_json
 
 
 @command("new", "Make")
@@ -48,6 +49,8 @@ def new_command(
     annelid new tube.toml --strand-radius 0.003 --young-modulus 2.2e8
     annelid run mine.toml
     """
+    from annelid.analysis import three_digits
+    from annelid.body import bearable_force_N, worm_of
     from annelid.config import load_config
     from annelid.output import write_text
     from annelid.plausibility import refuse_nonsense
@@ -58,5 +61,12 @@ def new_command(
     refuse_existing(path, force, "")
     own = similar_worm(radius, segments, helices, length, rear_radius, segment_length, strand_radius, young_modulus)
     print_paths([write_text(path, worm_text(own))])
-    for doubt in refuse_nonsense(load_config(path)):
-        complain(f"warning: {doubt}")
+    config = load_config(path)
+    if not wants_json():
+        body = worm_of(config)
+        closing_N = three_digits(min(bearable_force_N(one) for _, one in body.groups()))
+        size = f"{body.n_segments} segments, {body.mesh.n_helices} strands"
+        typer.echo(f"{size}; a ring closes under about {closing_N} N")
+        typer.echo(f"next: annelid check {shlex.quote(str(path))}")
+    for doubt in refuse_nonsense(config):
+        remark(f"warning: {doubt}")

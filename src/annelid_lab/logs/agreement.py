@@ -174,8 +174,8 @@ def compare_series(series: Mapping[str, tuple[Array, Array, str]], log: Measured
     if np.isfinite(ratio) and abs(ratio - 1.0) > 0.005 and given != "free":
         notes.append(
             f"the measured period is {periods[0]:.4g} s, the simulated one {periods[1]:.4g} s, a difference of "
-            f"{100 * (ratio - 1):+.1f} %, so that both run apart; "
-            'clock_drift = "free" in the map takes it for the log\'s clock'
+            f"{100 * (ratio - 1):+.1f} %, so that both run apart. If only the log's clock is wrong, write "
+            'clock_drift = "free" in the map'
         )
     rows = dict(zip(log.columns, zip(measured, simulated_here, strict=True), strict=True))
     signals = {}

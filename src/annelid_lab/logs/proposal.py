@@ -78,7 +78,7 @@ def proposed_map(path: Path) -> tuple[str, list[str]]:
         entries, unstated = _signals_entries([name for name in table.names if name != time], table)
     missing += unstated
     if all(entry.startswith("#") for entry in entries):
-        missing += ["what the columns are, under [map]"]
+        missing += ["what the columns are, under [map]; docs/how_to/measured_data.md lists the signals"]
     return "\n".join([*lines, "", "[map]", *entries, ""]), missing
 
 
@@ -117,16 +117,17 @@ def _signals_entries(names: Sequence[str], table: LogTable) -> tuple[list[str], 
         elif _TRAVEL.fullmatch(base):
             signal = "travel"
         else:
-            entries += [f'# {toml_value(name)} = ""   # not recognised']
+            example = '{ signal = "stretch_length[1, mean]", unit = "mm" }'
+            entries += [f"# {toml_value(name)} = {example}   # an example"]
             continue
         counted = "pixel" if unit == "px" else "count" if unit is None and match and match[1] else None
         if counted:
             own = "" if unit else ', unit = "1", offset = "free"'
-            remark = f"scale = 0.0001? metres in a {counted}: the log does not say"
-            entries += [f'{toml_value(name)} = {{ signal = "{signal}"{own} }}   # {remark}']
+            entries += [f"# scale: the metres in a {counted}, such as 0.0001; the log does not say"]
+            entries += [f'{toml_value(name)} = {{ signal = "{signal}"{own}, scale = "?" }}']
             missing += [f"scale, the metres in a {counted}, of {toml_value(name)}"]
         elif unit is None:
-            entries += [f'{toml_value(name)} = {{ signal = "{signal}" }}   # unit = "mm"? the log does not say']
+            entries += [f'{toml_value(name)} = {{ signal = "{signal}", unit = "?" }}   # such as "mm"']
             missing += [f"the unit of {toml_value(name)}"]
         elif is_stated:
             entries += [f'{toml_value(name)} = "{signal}"']

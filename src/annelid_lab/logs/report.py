@@ -24,7 +24,8 @@ def agreement_table(found: Agreement) -> str:
             period = UNKNOWN if isnan(period_s) else f"{three_digits(period_s)} s"
             rows.append((label, f"{three_digits(scale * size)} {unit}", f"{100 * high:.0f} %", period, *behind))
     lag = f"lag {three_digits(found.lag_s)} s, clock drift {100 * found.clock_drift:.2f} %"
-    return f"{aligned(rows)}\n{lag}"
+    below = "measured, simulated below it; below an error, its share of the amplitude"
+    return f"{aligned(rows)}\n{below}\n{lag}"
 
 
 def agreement_figure(found: Agreement, stem: Path) -> Path:

@@ -7,6 +7,7 @@ from annelid_lab.loop.peer import Fault, Peer, serve
 from annelid_lab.loop.pseudo_robot import PseudoRobot
 from annelid_lab.loop.servos import Wiring
 from annelid_lab.loop.session import Limits
+from annelid_lab.loop.wheels import Wheels
 
 __all__ = [
     "Driven",
@@ -19,6 +20,7 @@ __all__ = [
     "Role",
     "SerialLink",
     "UdpLink",
+    "Wheels",
     "Wiring",
     "drive",
     "open_link",

@@ -61,7 +61,7 @@ class Protocol2:
         length: Where its length stands, that of what is behind.
         registers: Address and bytes of each register; what a servo has not is left out.
         wheel_mode: What `Register.MODE` is for a servo that turns without end.
-        speed_steps_per_s: Steps a second, of which a turn has 4096, in one unit of `Register.SPEED`.
+        rpm_per_unit: Turns a minute in one unit of `Register.SPEED`.
         most_servos: That one packet can set.
     """
 
@@ -73,7 +73,7 @@ class Protocol2:
     }  # fmt: skip
     wheel_mode, extended_mode = 1, 4
     most_servos = 252
-    speed_steps_per_s = 0.229 / 60 * STEPS_PER_TURN
+    rpm_per_unit = 0.229
 
     def packet(self, servo: int, instruction: int, parameters: bytes = b"") -> bytes:
         """Returns a packet for the line, in whose body no other may seem to begin."""
@@ -129,7 +129,7 @@ class Protocol1(Protocol2):
     }  # fmt: skip
     wheel_mode = 0
     most_servos = 50  # the length of a packet is one byte, and a mode has four
-    speed_steps_per_s = 0.111 / 60 * STEPS_PER_TURN
+    rpm_per_unit = 0.111
     backward = 0x400
 
     def packet(self, servo: int, instruction: int, parameters: bytes = b"") -> bytes:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import select
 import socket
 from typing import Any, Protocol
 
-from annelid.errors import ConfigError, MissingDependency
+from annelid.errors import ConfigError, MissingDependency, listed
 
 MOST_READ = 4096
 """Bytes that one call returns, at most."""
@@ -46,6 +47,7 @@ class SerialLink:
         """Opens a port such as ``/dev/ttyACM0`` at a rate in bits per second."""
         try:
             import serial
+            from serial.tools.list_ports import comports
         except ImportError:
             raise MissingDependency(
                 "a serial port needs pyserial: install it with  pip install 'annelid[hardware]'"
@@ -54,7 +56,13 @@ class SerialLink:
         try:
             self._port: Any = serial.Serial(port, baud, timeout=0, write_timeout=_WRITE_TIMEOUT_S, exclusive=True)
         except (OSError, ValueError) as error:
-            raise ConfigError(f"cannot open the serial port {port}: {error}") from None
+            code = getattr(error, "errno", None)
+            reason = os.strerror(code) if isinstance(code, int) else str(error)
+            found = listed(one.device for one in comports()) or "none"
+            raise ConfigError(
+                f"cannot open the serial port {port}: {reason}; ports of this machine: {found}; "
+                "annelid loop PRESET --pseudo needs none"
+            ) from None
 
     def send(self, data: bytes) -> None:
         """Sends bytes; a port that takes none for long raises OSError."""

@@ -27,6 +27,7 @@ class PseudoRobot:
     Attributes:
         name: For sentences.
         position: Of every servo, in its steps, ``(n_muscles,)``.
+        given_way: What its cable adds to the speed of every wheel that turns, in steps a second, ``(n_muscles,)``.
     """
 
     name = "the pseudo-robot"
@@ -64,6 +65,7 @@ class PseudoRobot:
         self._now_s = self._last_packet_s = clock()
         self._answers: deque[tuple[float, bytes]] = deque(maxlen=1024)
         self.position = np.full(n_muscles, float(self.wiring.relaxed))
+        self.given_way = np.zeros(n_muscles)
         self._table = {register: np.zeros(n_muscles, dtype=np.int64) for register in Register}
         self._table[Register.GOAL][:] = self.wiring.relaxed
         self._table[Register.MOST_SPEED][:] = MOST_SPEED
@@ -109,7 +111,8 @@ class PseudoRobot:
         # A servo whose watchdog has ended the session stays where it is, and takes no goal until that is written as 0.
         moves = (self._table[Register.TORQUE] == 1) & ~self._watchdog_ended
         if self.wiring.is_wheel:
-            moved = self._bus.speed_steps_per_s * time_s * self._table[Register.SPEED]
+            speed = self._table[Register.SPEED]
+            moved = time_s * (self.wiring.steps_per_s * speed + np.where(speed, self.given_way, 0.0))
         else:
             moved = -np.expm1(-time_s / self._lag_s) * (self._table[Register.GOAL] - self.position)
         self.position += np.where(moves, moved, 0.0)

@@ -44,6 +44,8 @@ class Wiring:
         protocol: 1 or 2: how the bus speaks.
         is_wheel: Whether servos turn without end, at a speed. Positions then are steps of 1/4096 turn, counted by
             integrating the speeds that were sent, from relaxed at the start; by protocol 1.0 they are what is sensed.
+        rpm_per_unit: Of a wheel's speed; None for what the protocol says. Servos of the series AX take a share of their
+            output instead, whose unit is their speed without load over 1023: 0.0948 for an AX-18A at 12 V.
 
     Raises:
         ConfigError: Equal positions, one that the servos do not have, or a length that is zero.
@@ -55,6 +57,7 @@ class Wiring:
     m_per_count: float = 0.3 / 4095
     protocol: int = 2
     is_wheel: bool = False
+    rpm_per_unit: float | None = None
 
     def __post_init__(self) -> None:
         """Checks the numbers."""
@@ -67,6 +70,8 @@ class Wiring:
                 raise ConfigError(f"{name} must be a position of {least} .. {most}, not {position}")
         if self.relaxed == self.contracted or self.m_per_count == 0:
             raise ConfigError("relaxed and contracted must differ, and m_per_count must not be 0")
+        if self.rpm_per_unit is not None and not self.rpm_per_unit > 0:
+            raise ConfigError(f"rpm_per_unit must be more than 0, or None for the protocol's, not {self.rpm_per_unit}")
 
     @property
     def mode(self) -> int | None:
@@ -76,6 +81,11 @@ class Wiring:
             return bus.wheel_mode
         several = not all(0 <= position < STEPS_PER_TURN for position in (self.relaxed, self.contracted))
         return Protocol2.extended_mode if several else None
+
+    @property
+    def steps_per_s(self) -> float:
+        """Steps a second in one unit of a wheel's speed."""
+        return (self.rpm_per_unit or PROTOCOLS[self.protocol].rpm_per_unit) / 60 * STEPS_PER_TURN
 
     def goals(self, activation: Array) -> list[int]:
         """Returns the positions for activations."""
@@ -222,7 +232,7 @@ class ServoPlant(PacedPlant):
         if not self._wiring.is_wheel:
             self._write(Register.GOAL, goals)
             return
-        now, unit = self._pace.clock(), self._bus.speed_steps_per_s
+        now, unit = self._pace.clock(), self._wiring.steps_per_s
         self._wound += unit * self._speed * (now - self._turned_s)
         left = np.array(goals) - self._wiring.relaxed - self._wound
         most, wanted = float(self._most_speed), np.rint(left / (unit * self._pace.period_s))

@@ -25,14 +25,16 @@ _LETTERS = 36
 _FAILED: Any = {"color": "0.6", "markersize": 5.0}
 _MOST_TICKS = 8
 _MOST_WRITTEN = 6  # cells of a row or a column whose numbers fit into them
+_LEAST_RANGE = 0.02
+"""Colours and axes span at least this share of the largest number, so that a tiny difference looks like one."""
 
 
 def sweep_figure(data: xr.Dataset, fields: Sequence[str], numbers: Sequence[str], stem: str | Path) -> Path:
     """Draws numbers over the varied fields; runs without a number are marked with crosses.
 
     Args:
-        data: The numbers along the fields of a grid or along ``sample``, perhaps along ``repeat``: over one field their
-            mean is drawn with its 95 % interval.
+        data: The numbers, each with its attribute ``heading``, along the fields of a grid or along ``sample``, perhaps
+            along ``repeat``: over one field their mean is drawn with its 95 % interval.
         fields: The varied fields, coordinates of the data.
         numbers: Variables of the data. Over three or more fields the first is drawn over each of them.
         stem: Path without suffix; ``.svg`` and ``.png`` are written, and the latter's path is returned.
@@ -75,6 +77,8 @@ def _line(axes: Axes, data: xr.Dataset, field: str, name: str) -> None:
         axes.legend(loc="best", fontsize=7.0)
     mark_lost(axes, x[np.isnan(y).any(axis=1)], _FAILED["color"], 0.03)
     axes.set_ylabel(_quantity(values))
+    if limits := _wider(y):
+        axes.set_ylim(*limits)
 
 
 def _map(figure: Figure, axes: Axes, data: xr.Dataset, fields: Sequence[str], name: str) -> None:
@@ -113,8 +117,18 @@ def _colors(values: np.ndarray) -> dict[str, Any]:
 
     known = values[np.isfinite(values)]
     if not known.size or known.min() >= 0.0 or known.max() <= 0.0:
-        return {"cmap": COLORS}
+        return {"cmap": COLORS, **dict(zip(("vmin", "vmax"), _wider(known) or (), strict=False))}
     return {"cmap": SIGNED, "norm": CenteredNorm()}
+
+
+def _wider(values: np.ndarray) -> tuple[float, float] | None:
+    """Returns limits about numbers that are nearly equal, `_LEAST_RANGE` apart; None for others."""
+    known = values[np.isfinite(values)]
+    least = _LEAST_RANGE * float(np.abs(known).max(initial=0.0))
+    if not known.size or float(np.ptp(known)) >= least:
+        return None
+    middle = float(known.min() + known.max()) / 2
+    return middle - least / 2, middle + least / 2
 
 
 def _places(axes: Axes, which: str, coordinate: xr.DataArray) -> np.ndarray:
@@ -134,8 +148,8 @@ def _is_number(coordinate: xr.DataArray) -> bool:
 
 
 def _quantity(values: xr.DataArray) -> str:
-    """Writes what numbers are called, with their unit, and what they are the mean of; in lines that fit there."""
-    return "\n".join(wrap(worded(str(values.name), values.attrs["units"]) + values.attrs.get("of", ""), _LETTERS))
+    """Writes what numbers are called, in lines that fit there."""
+    return "\n".join(wrap(values.heading, _LETTERS))
 
 
 def _label(coordinate: xr.DataArray) -> str:
@@ -144,6 +158,7 @@ def _label(coordinate: xr.DataArray) -> str:
 
 def worded(name: str, unit: str) -> str:
     """Writes a name without the unit that ends it, and the unit in brackets."""
+    name = name.removeprefix("n_")
     if unit == "1":
         return name.replace("_", " ")
     ending = "_" + unit.replace("1/", "per ").replace("/", " per ").replace(" ", "_")

@@ -28,6 +28,8 @@ NORMAL_MEDIAN = 0.6745
 """Median of the distance of normal numbers from their mean, in standard deviations."""
 FEWEST_CYCLES = 2.0
 """Cycles that a log should have."""
+GAP = 0.5
+"""Longest gap of a log, in cycles, that is not named."""
 LAGS, DRIFTS = 300, 41
 """Lags and drifts that are looked at before the best is refined."""
 
@@ -107,6 +109,10 @@ class Walk(Experiment):
         label = f"signals ({unit})" if one_unit else "signals over their standard deviations"
         return Data(of[0], of[1], which, ("time of the log (s)", label), unit, log.notes, samples)
 
+    def place(self, data: Data) -> Array:
+        """Share of the log's time, so that the last cycles of all signals can be held out."""
+        return data.at / float(np.ptp(data.source.log.time_s))
+
     def test(self, config: RunConfig, data: Data) -> WalkTest:
         """Returns the run to make, with the signals of the map."""
         log: Measured = data.source.log
@@ -145,7 +151,7 @@ class Walk(Experiment):
         return np.concatenate(floor)
 
     def doubts(self, data: Data, found: Found) -> list[str]:
-        """Says whether the log is long enough."""
+        """Says whether the log is long and whole enough."""
         from annelid_lab.logs.agreement import period
 
         source, time_s = data.source, found["time_0"]
@@ -154,12 +160,20 @@ class Walk(Experiment):
         cycle_s = period(values) * float(time_s[1] - time_s[0])
         if not np.isfinite(cycle_s):
             return [f"no period is found in the {time_s[-1]:.3g} s of the run: let it and the log last several cycles"]
-        if span_s >= FEWEST_CYCLES * cycle_s:
-            return []
-        return [
-            f"the log has {span_s / cycle_s:.1f} cycles of {cycle_s:.2g} s: what repeats cannot be told from what "
-            f"happened once; log at least {FEWEST_CYCLES:g}"
-        ]
+        sentences: list[str] = []
+        if span_s < FEWEST_CYCLES * cycle_s:
+            sentences.append(
+                f"the log has {span_s / cycle_s:.1f} cycles of {cycle_s:.2g} s: what repeats cannot be told from what "
+                f"happened once; log at least {FEWEST_CYCLES:g}"
+            )
+        logged = np.unique(np.concatenate(source.at))
+        longest = int(np.diff(logged).argmax())
+        if (gap_s := float(np.diff(logged)[longest])) > GAP * cycle_s:
+            sentences.append(
+                f"nothing was logged for {gap_s:.2g} s after {logged[longest]:.3g} s: if the clock stopped there, all "
+                "that follows is compared too early; log without a gap, or cut the log there"
+            )
+        return sentences
 
     def alignment(self, data: Data, found: Found) -> tuple[float, float]:
         """Time of the run at the log's first instant, s, and drift of the log's clock, where both lie nearest."""
@@ -176,8 +190,13 @@ class Walk(Experiment):
             drifts = np.array([float(log_map.clock_drift)])
         ways = [(lag, drift) for drift in drifts for lag in lags]
         free = [axis for axis, values in enumerate((lags, drifts)) if len(values) > 1]
+        kept = ~self.held(data)
+
+        def misfit(way: tuple[float, float]) -> float:
+            return float(((self._coarse(data, found, *way) - data.values)[kept] ** 2).sum())
+
         # Phases first: the whole range is searched before anything is refined.
-        best = np.array(min(ways, key=lambda way: float(((self._coarse(data, found, *way) - data.values) ** 2).sum())))
+        best = np.array(min(ways, key=misfit))
         if not free:
             return float(best[0]), float(best[1])
         size = np.array(
@@ -187,7 +206,7 @@ class Walk(Experiment):
         def off(moved: Array) -> Array:
             here = best.copy()
             here[free] += moved * size[free]
-            return (self._shifted(data, found, *here) - data.values) / np.std(data.values)
+            return (self._shifted(data, found, *here) - data.values)[kept] / np.std(data.values)
 
         low, high = np.full(len(free), -1.0), np.full(len(free), 1.0)
         moved = least_squares(off, np.zeros(len(free)), bounds=(low, high), diff_step=0.05, x_scale=1.0).x

@@ -21,7 +21,7 @@ from annelid.output import write_csv
 
 SOLVERS = "annelid", "pyelastica", "mujoco"
 METRICS = {"cantilever": "tip_deflection_error", "catenary": "sag_error", "pendulum": "period_error"}
-METRICS |= {"pendulum_amplitude": "amplitude_change", "twist": "critical_twist_error", "crossing": "lift_error"}
+METRICS |= {"pendulum, amplitude": "amplitude_change", "twist": "critical_twist_error", "crossing": "lift_error"}
 """What is shown of an experiment."""
 
 
@@ -31,8 +31,8 @@ def rows(folders: list[Path]) -> list[dict[str, Any]]:
     for path in sorted(path for folder in folders for path in folder.rglob("result.json")):
         result = json.loads(path.read_text(encoding="utf-8"))
         for name, metric in METRICS.items():
-            if result["experiment"] == name.partition("_")[0] and result["solver"] in SOLVERS:
-                row = {"experiment": name, "elements": result["n_elements"]} | dict.fromkeys(SOLVERS, "")
+            if result["experiment"] == name.partition(",")[0] and result["solver"] in SOLVERS:
+                row = {"experiment": name, "elements": result["n_elements"]} | dict.fromkeys(SOLVERS, "not run")
                 value = result["metrics"].get(metric)
                 shown = result["outcome"] if value is None else f"{abs(value):.3g}"
                 found.setdefault((name, result["n_elements"]), row)[result["solver"]] = shown

@@ -22,6 +22,7 @@ SOURCES = {
     "daltorio2013": {"daltorio2013"},
     "boxerbaum2012": {"boxerbaum2012"},
     "wang": {"wang", "riddle2025models"},
+    "meshworm": {"seok2013", "liang1990"},
     **{name: {"wang", "riddle2022"} for name in preset_names() if name.startswith("riddle2023")},
 }
 """What each preset is named after, or its file states as its source; all others come from the robot of 2025."""

@@ -16,6 +16,7 @@ from annelid.simulation.worm import WormPlant
 FREE = {"arena.floor_gap_m": 30.0, "body.rings.passive_peak": 1e-12}
 """Far above the floor, and with muscles that do not pull on their own."""
 SERVOS = {"body.rings": {"kind": "servo", "layout": "halves", "force_limit_N": 6.0}}
+COILS = {"body.rings": {"kind": "coil", "length_range_m": [0.95, 1.2], "coils": 20.0, "current_A": 20.0}}
 
 
 def worm(step_s: float, **changes: Any) -> WormPlant:
@@ -109,7 +110,7 @@ def test_what_ties_store_and_take_is_accounted_for() -> None:
     assert held_J[2] > 0.1
 
 
-@pytest.mark.parametrize("rings", [{}, SERVOS], ids=["muscles", "servos"])
+@pytest.mark.parametrize("rings", [{}, SERVOS, COILS], ids=["muscles", "servos", "coils"])
 def test_slopes_of_the_actuators_are_those_that_the_engine_s_integrator_takes(rings: dict[str, Any]) -> None:
     plant = worm(0.005, **rings)
     data, n = plant.data, plant.n_muscles
@@ -123,8 +124,9 @@ def test_slopes_of_the_actuators_are_those_that_the_engine_s_integrator_takes(ri
         stiffness, metric = np.zeros(n), np.zeros(n)
         stiffness[ids] = data.efm_ak[: data.nefmA]
         metric[ids] = data.efm_as[: data.nefmA]
+        drive = plant.anatomy.rings.drive(activation, data.act)
         per_length, per_rate = energy_meter.slopes(
-            data.actuator_length, data.actuator_velocity, data.act, -data.actuator_force
+            data.actuator_length, data.actuator_velocity, drive, -data.actuator_force
         )
         assert h * per_length == pytest.approx(stiffness, abs=1e-9)
         assert h * per_rate + h * h * per_length == pytest.approx(metric, abs=1e-9)

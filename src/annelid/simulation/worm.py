@@ -207,7 +207,7 @@ class WormPlant:
                 if acts:
                     self._act(activation[np.newaxis], self._step_s)
                 self.ctrl[:] = rings.control(activation, self.act)
-                self._take_step(self.act.copy() if self.model.na else activation)
+                self._take_step(rings.drive(activation, self.act))
         except mujoco.FatalError as error:
             raise SimulationStopped(f"the engine stopped at {self.data.time:.3f} s: {error}") from None
         self._contact_N, ground_N = self.anatomy.contacts(self.data)

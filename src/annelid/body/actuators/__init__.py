@@ -33,7 +33,7 @@ class ActuatorKind(Kind):
     """Base of the ring actuators' sections: how they lie, between which lengths they work, and what is asked of them.
 
     Attributes:
-        force_field: The field of its greatest force, of type `PerSegment`.
+        force_field: The field that sets its greatest force, of type `PerSegment`.
     """
 
     registry: ClassVar[Registry[type[Any]]] = Registry("body.rings.kind", "annelid.body.actuators")
@@ -78,8 +78,8 @@ class ActuatorKind(Kind):
 
     def of_segments(self, segments: Sequence[int], n_segments: int) -> Self:
         """Returns the section with the ranges and forces of some of the segments only, counted from 0."""
-        ranges, forces = self.length_ranges(n_segments), self.forces(n_segments)
-        chosen = {"length_range_m": ranges, self.force_field: forces}
+        ranges, strengths = self.length_ranges(n_segments), self.of_each(self.force_field, n_segments)
+        chosen = {"length_range_m": ranges, self.force_field: strengths}
         return self.model_copy(update={name: tuple(values[s] for s in segments) for name, values in chosen.items()})
 
     def findings(self, body: MeshBody) -> Iterator[Finding]:
@@ -132,6 +132,10 @@ class ActuatorKind(Kind):
             time_s: For which each command lasts, s.
         """
         return state
+
+    def drive(self, activation: Array, state: Array) -> Array:
+        """Returns what the gain of each actuator is multiplied by during a step, ``(n_muscles,)``, as a copy."""
+        return state.copy() if state.size else activation
 
     def control(self, activation: Array, state: Array) -> Array:
         """Returns the engine's control, ``(n_muscles,)``, that leaves the states alone during a step."""

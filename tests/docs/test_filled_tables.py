@@ -52,6 +52,7 @@ NO_WORM = {
     "robust_network.csv": "networks without a body",
     "firmware_random.csv": "the same",
     "peers.csv": "a strand and a net without a worm",
+    "rod_bench.csv": "single rods",
     "calibration_default.json": "a fit with a body of its own",
     "identify_recovery.csv": "synthetic robots",
     "identify_recovery_table.csv": "the same",

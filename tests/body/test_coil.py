@@ -99,6 +99,7 @@ def test_at_one_phase_a_ring_is_pulled_by_a_linear_spring(state: tuple[float, fl
 def test_a_worm_with_coils_crawls(tmp_path: Path) -> None:
     numbers = summary(simulate(load_config("meshworm", {"duration_s": 14.0}), tmp_path, progress=False))
     assert numbers.order[:10] == [1, 2, 3, 4, 5] * 2
+    assert numbers.speed_m_per_s is not None
     assert numbers.speed_m_per_s > 1e-3
 
 

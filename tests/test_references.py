@@ -37,6 +37,9 @@ CONTROLLERS = {
     "timed": {"riddle2025models"},
     "network": {"riddle2022"},
     "sine": set(),
+    "discrete": {"fang2015"},
+    "reflex": set(),
+    "policy": set(),
 }
 
 

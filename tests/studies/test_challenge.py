@@ -17,8 +17,8 @@ from annelid.experiment import Store
 from annelid.protocols import Array, Controller, Plant, Sensation
 from annelid.simulation import WormPlant, build_controller
 from annelid_lab.robots.body import EXAMPLE
+from annelid_studies.baselines import DiscreteGait
 from annelid_studies.challenge import report, scores, tasks
-from annelid_studies.challenge.controllers import DiscreteGait
 from annelid_studies.challenge.ranking import ALL, Speeds, half_step_changes, mean_ranks, pairs, standings
 from annelid_studies.challenge.scores import Score, challenge, electric_energy_J, read_scores
 from annelid_studies.challenge.tasks import REFERENCE, Entrant, all_tasks, entries, find_entrants

@@ -12,7 +12,7 @@ from annelid.config import RunConfig, load_config
 from annelid.errors import ConfigError
 from annelid.protocols import Array
 from annelid.simulation import WormPlant
-from annelid_studies.challenge.policy import LARGEST, Policy, PolicyController, inputs
+from annelid_studies.policy import LARGEST, Policy, PolicyController, inputs
 
 N = 3
 RNG = np.random.default_rng(0)

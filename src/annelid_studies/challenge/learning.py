@@ -32,15 +32,14 @@ from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 
 from annelid.config import load_config
-from annelid.control import OpenLoopKind
 from annelid.draw import canvas, panel_title, save_both, segment_colors
 from annelid.environments import WormEnv
 from annelid.experiment import StudyProgress
 from annelid.output import write_csv, write_text
 from annelid.protocols import Array
-from annelid_studies.challenge.policy import LARGEST, STRETCH_M, Policy, inputs
 from annelid_studies.challenge.tasks import FIRST_TEST_SEED, Entrant, all_tasks
 from annelid_studies.challenge.tuning import write_entrants
+from annelid_studies.policy import LARGEST, STRETCH_M, Policy, inputs
 from annelid_studies.tables import grouped
 
 TASKS = ("level", "friction", "slope")
@@ -236,10 +235,9 @@ class Learner:
         for seed in range(WAVES):
             slower = float(np.exp(rng.uniform(-SLOWER, SLOWER)))
             times = {name: slower * value for name, value in WAVE[self._body].items()}
-            wave = load_config(
+            wave: Any = load_config(
                 all_tasks().bodies[self._body].preset, {"controller": {"kind": "timed", **times}}
             ).controller
-            assert isinstance(wave, OpenLoopKind)
             env.begin(TASKS[0], seed)
             before: NDArray[Any] = env.read()
             way, asked, over, late = 0.0, list[tuple[NDArray[Any], Array]](), False, False

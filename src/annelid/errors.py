@@ -139,8 +139,9 @@ def suggest(name: str, valid: Iterable[str]) -> str:
     """
     names = sorted(valid)
     near = nearest(name, names)
-    hint = f"did you mean {shortened(near)!r}? T" if near is not None else "t"
-    return f"{hint}he valid ones are {listed(names)}"
+    if near is None:
+        return f"the valid ones are {listed(names)}"
+    return f"did you mean {shortened(near)!r}? The valid ones are {listed(names)}"
 
 
 def nearest(name: str, valid: Sequence[str]) -> str | None:

@@ -7,7 +7,10 @@ from collections.abc import Iterable
 from typing import Any, TextIO, cast
 from unicodedata import category
 
-__all__ = ["is_line", "numbered", "printable", "write_printable_only"]
+__all__ = ["LINE", "is_line", "numbered", "printable", "write_printable_only"]
+
+LINE = 80
+"""Characters of a line of tables, sentences and comments that annelid writes."""
 
 _KEPT = frozenset("\n\t\N{ZERO WIDTH JOINER}\N{ZERO WIDTH NON-JOINER}")
 """Lines, and what writing systems and emoji need inside words."""

@@ -17,6 +17,7 @@ from annelid.analysis import summary
 from annelid.draw import UNKNOWN, aligned, canvas, panel_title, plain, save_both, segment_colors
 from annelid.morphology import Array
 from annelid.simulation import Run
+from annelid.text import LINE
 from annelid.textfiles import parse_toml
 
 QUANTITIES: Mapping[str, str] = {
@@ -32,7 +33,7 @@ QUANTITIES: Mapping[str, str] = {
 """What each number is called; those from the stride on have no unit."""
 AT_REST = 0.5
 """Share of the worm's own speed below which a segment on the ground counts as anchored."""
-_N_PER_SECOND, _WIDTH, _MARKERS = 2, 80, "os^Dv"
+_N_PER_SECOND, _MARKERS = 2, "os^Dv"
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,7 +123,7 @@ def limits(run: Run) -> str:
         f"A worm of {length_m:.2f} m can be compared with animals in what has no unit, which hardly changes with an "
         "earthworm's mass: stride, anchored share, delay and strain. It cannot in frequency, speed or force: these "
         f"follow its motors and its {mass_kg:.2g} kg, where the largest earthworm measured has 8.5 g.",
-        _WIDTH,
+        LINE,
     )
 
 
@@ -130,11 +131,11 @@ def animals_table(subjects: Sequence[Subject]) -> str:
     """Lays subjects side by side, a line for each number, and their sources below."""
     rows = [("", *(one.name for one in subjects))]
     rows += [(label, *(_cell(one, name) for one in subjects)) for name, label in QUANTITIES.items()]
-    sources = [fill(f"{one.name}: {one.source}", _WIDTH) for one in subjects if one.source]
+    sources = [fill(f"{one.name}: {one.source}", LINE) for one in subjects if one.source]
     legend = (
         "lengths: body lengths; ground, anchored, delay, shortened: shares of a cycle; longest/shortest: of a segment"
     )
-    notes = fill(f"{legend}; *: not read in the publication itself", _WIDTH)
+    notes = fill(f"{legend}; *: not read in the publication itself", LINE)
     return "\n".join([aligned(rows), "", notes, *sources])
 
 

@@ -26,6 +26,7 @@ from annelid.config import RunConfig, check_section, load_config, toml_value
 from annelid.errors import ConfigError, require_finite, require_positive
 from annelid.morphology import rhombus
 from annelid.plausibility import refuse_nonsense
+from annelid.text import LINE
 
 BASE = "riddle2023-rods"
 """The preset that new worms are similar to."""
@@ -40,8 +41,6 @@ MOST_RADIUS_M = 1.0
 CYCLES = 4
 """Cycles of the paper's network, 0.875 s a segment at the base's size, that a run lasts."""
 TURN_S = 0.875
-LINE = 80
-"""Characters of a line of the file, with its comment."""
 
 Fields = dict[str, tuple[Any, str]]
 """Values by dotted path, each with the rule that it follows."""

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+import annelid_studies.challenge
 from outcome import Command
 
 MINE = "[mine]\ncontroller = {kind = 'sine'}\ntuned_on = [0, 1001]\n"
@@ -34,7 +35,9 @@ def test_what_cannot_be_ranked_is_refused_in_a_sentence(
 
 def test_training_names_the_line_that_installs_its_library(annelid: Command, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "stable_baselines3", None)
+    # Another test may have loaded the module: its package has it, too.
     monkeypatch.delitem(sys.modules, "annelid_studies.challenge.learning", raising=False)
+    monkeypatch.delattr(annelid_studies.challenge, "learning", raising=False)
     done = annelid("study", "challenge", "--train", "1000", "--quiet")
     assert done.exit_code == 2
     assert "pip install 'annelid[learn]'" in done.sentence()

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from annelid.cli.entry import EXIT_INTERRUPTED, LINE, complain, lock, remark, typed_command
+from annelid.cli.entry import EXIT_INTERRUPTED, complain, lock, remark, typed_command
 from annelid.cli.json_output import give_files, records, wants_json
 from annelid.errors import ConfigError, RunFileError
+from annelid.text import LINE
 
 if TYPE_CHECKING:
     from rich.table import Table

@@ -21,7 +21,7 @@ from typer.core import TyperCommand, TyperGroup
 
 from annelid.cli.json_output import with_json
 from annelid.errors import AnnelidError, ConfigError, RunKilled, SimulationStopped, shown, suggest
-from annelid.text import write_printable_only
+from annelid.text import LINE, write_printable_only
 
 EXIT_DONE = 0
 """Everything that was asked for is there."""
@@ -50,8 +50,6 @@ OLD_COMMANDS: Mapping[str, tuple[str, ...]] = {
     **{name: ("study", name) for name in ("limit-cycle", "bench", "robustness", "challenge")},
 }
 """What commands of before are now; they go on for one release (docs/roadmap.md lists them)."""
-LINE = 80
-"""Characters of a line of text in the terminal."""
 WIDEST = 200
 """Characters of a command's line in the help, which goes on in the next line and is never cut."""
 

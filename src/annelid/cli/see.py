@@ -27,9 +27,10 @@ from annelid.cli.common import (
     runs_from,
     worms_from,
 )
-from annelid.cli.entry import LINE, command, lock
+from annelid.cli.entry import command, lock
 from annelid.cli.json_output import give, refuse_json
 from annelid.errors import ConfigError, RunFileError, suggest
+from annelid.text import LINE
 
 if TYPE_CHECKING:
     from annelid.config import RunConfig

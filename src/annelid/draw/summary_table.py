@@ -23,12 +23,11 @@ from annelid.analysis.paper import (
 from annelid.analysis.summary import NUMBERS, Summary
 from annelid.config import toml_value
 from annelid.errors import ConfigError, listed, shortened, suggest
+from annelid.text import LINE
 
 if TYPE_CHECKING:
     from annelid.config import RunConfig
 
-WIDTH = 80
-"""Characters of a line that tables keep to."""
 COMPARED = ("reference", "off by")  # headings of what stands beside our numbers
 MOVED = "moves by"
 _SEGMENTS_SHOWN, _ONSETS_SHOWN = 6, 9
@@ -294,7 +293,7 @@ def fields_table(comparison: Comparison) -> str:
     widest = max(map(len, fields), default=0)
     blocks = []
     for shown in _blocks(len(comparison.labels)) if fields else []:
-        most = max((WIDTH - widest) // len(shown) - 4, 6)
+        most = max((LINE - widest) // len(shown) - 4, 6)
         lines = [[field, *(shortened(values[i], most) for i in shown)] for field, values in fields.items()]
         blocks.append(aligned([["", *(str(i + 1) for i in shown)], *lines]))
     if network == {}:

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from annelid.experiment.outcome import Hold, Outcome
     from annelid.experiment.progress import StudyProgress, study_progress
     from annelid.experiment.store import Store, case_key
+    from annelid.experiment.tune import load_optuna, parzen_study
 
 __all__ = [
     "SHEAR_OVER_YOUNG",
@@ -44,8 +45,10 @@ __all__ = [
     "end_after",
     "finer_steps",
     "judge",
+    "load_optuna",
     "more_elements",
     "numerical_problem",
+    "parzen_study",
     "physics_fingerprint",
     "room_of",
     "study_progress",

@@ -203,7 +203,7 @@ def search(task: Task, store: Store) -> Iterator[list[Trial]]:
     A run that cannot be built, stops, falls silent or out of order, or does not advance counts as a trial with the
     objectives' penalties; the run that it starts from must be one that can be built and written.
     """
-    study, start = _study(task), task.start
+    study, start = parzen_study(_directions(task.objectives), generation_size(task), task.seed), task.start
     found: list[Trial] = []
 
     def finish(cases: Sequence[Case], stage: str) -> list[Done]:
@@ -224,9 +224,8 @@ def search(task: Task, store: Store) -> Iterator[list[Trial]]:
     own = {one.field: field_value(start.config, one.field) for one in task.variables}
     if all(own[one.field] in one for one in task.variables):
         known = {one.field: _place(one, own[one.field]) for one in task.variables}
-        study.add_trial(
-            _optuna().trial.create_trial(params=known, distributions=ranges, values=found[0].scores(task.objectives))
-        )
+        scores = found[0].scores(task.objectives)
+        study.add_trial(load_optuna().trial.create_trial(params=known, distributions=ranges, values=scores))
     yield list(found)
     while (n := len(found) - 1) < task.n_trials:
         asked = [study.ask(ranges) for _ in range(min(generation_size(task), task.n_trials - n))]
@@ -245,7 +244,12 @@ def generation_size(task: Task) -> int:
     return max(8, 2 * floor((5 + 3 * log(len(task.variables))) / 2))
 
 
-def _optuna() -> Any:
+def load_optuna() -> Any:
+    """Returns Optuna, silent.
+
+    Raises:
+        MissingDependency: It is not installed.
+    """
     try:
         import optuna
     except ImportError:
@@ -254,14 +258,21 @@ def _optuna() -> Any:
     return optuna
 
 
-def _study(task: Task) -> optuna.Study:
+def parzen_study(directions: Sequence[str], generation: int, seed: int) -> optuna.Study:
+    """Returns a study of Optuna whose tree-structured Parzen estimator is asked for several trials at once.
+
+    Args:
+        directions: ``maximize`` or ``minimize`` for every value.
+        generation: Trials that are asked for at once; the first two generations are random.
+        seed: Of the estimator.
+    """
     with warnings.catch_warnings():
         # The sampler's options are called experimental.
         warnings.simplefilter("ignore")
-        sampler = _optuna().samplers.TPESampler(
-            seed=task.seed, n_startup_trials=2 * generation_size(task), multivariate=True, constant_liar=True
+        sampler = load_optuna().samplers.TPESampler(
+            seed=seed, n_startup_trials=2 * generation, multivariate=True, constant_liar=True
         )
-    return _optuna().create_study(sampler=sampler, directions=_directions(task.objectives))
+    return load_optuna().create_study(sampler=sampler, directions=directions)
 
 
 def _directions(objectives: Sequence[Objective]) -> list[str]:
@@ -270,7 +281,7 @@ def _directions(objectives: Sequence[Objective]) -> list[str]:
 
 def _range(variable: Variable) -> optuna.distributions.BaseDistribution:
     """Optuna's words for a variable; a choice is its number, since Optuna's own are plain values only."""
-    kinds = _optuna().distributions
+    kinds = load_optuna().distributions
     if isinstance(variable, Choice):
         return kinds.CategoricalDistribution(range(len(variable.values)))
     kind, number = (kinds.IntDistribution, int) if variable.whole else (kinds.FloatDistribution, float)
@@ -305,8 +316,8 @@ def front(trials: Sequence[Trial], objectives: Sequence[Objective]) -> list[Tria
     Of trials with the same run the first is taken.
     """
     walking = list({trial.path: trial for trial in reversed(trials) if not trial.judged.problem}.values())
-    study = _optuna().create_study(directions=_directions(objectives))
-    study.add_trials([_optuna().trial.create_trial(values=trial.scores(objectives)) for trial in walking])
+    study = load_optuna().create_study(directions=_directions(objectives))
+    study.add_trials([load_optuna().trial.create_trial(values=trial.scores(objectives)) for trial in walking])
     kept = [walking[one.number] for one in study.best_trials]
     return sorted(kept, key=lambda trial: trial.scores(objectives), reverse=objectives[0].more_is_better)
 

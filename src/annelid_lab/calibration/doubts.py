@@ -17,8 +17,8 @@ UNKNOWN = 0.3
 ALIKE = 0.9
 """Correlation above which two parameters are not told apart."""
 WRONG = 1.25
-"""How many times as far as noise and scatter explain points lie from a model that lacks something: three standard
-errors, of the rms of 180 points and of a noise that is estimated from 800 samples."""
+"""How many times as far as noise and scatter explain points lie from a model that lacks something. The rms of 180
+independent points varies by 5 %, a noise estimated from 800 samples by 3 %; a walk's depend on each other."""
 LEAST_WRONG = 0.01
 """Of the standard deviation of the points: what is less does not matter."""
 UNLIKE = 0.5

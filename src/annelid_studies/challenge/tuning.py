@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
@@ -12,8 +11,8 @@ from typing import Any
 import tomlkit
 
 from annelid.config import field_value
-from annelid.errors import ConfigError, MissingDependency
-from annelid.experiment import Store
+from annelid.errors import ConfigError
+from annelid.experiment import Store, load_optuna, parzen_study
 from annelid.output import write_text
 from annelid_studies.challenge.scores import challenge
 from annelid_studies.challenge.tasks import DIGITS, Entrant, Range, all_tasks, entries
@@ -103,14 +102,7 @@ class _Search:
 
     def trials(self, n_trials: int) -> list[tuple[float, dict[str, Any]]]:
         """Runs the search; speeds and fields of its trials, the fastest first."""
-        optuna = _optuna()
-        with warnings.catch_warnings():
-            # The sampler's options are called experimental.
-            warnings.simplefilter("ignore")
-            sampler = optuna.samplers.TPESampler(
-                seed=0, n_startup_trials=2 * GENERATION, multivariate=True, constant_liar=True
-            )
-        study = optuna.create_study(sampler=sampler, direction="maximize")
+        study = parzen_study(["maximize"], GENERATION, seed=0)
         ranges = {field: self._range(among) for field, among in self._entrant.vary.items()}
         starts = self._starts(ranges)
         for start in starts:
@@ -162,7 +154,7 @@ class _Search:
         return [sum(one.speed_m_per_s for one in scores if one.entrant == name) / n for name in named]
 
     def _range(self, among: Range) -> Any:
-        kinds = _optuna().distributions
+        kinds = load_optuna().distributions
         if among.whole:
             # A pattern has fewer segments than the body.
             return kinds.IntDistribution(int(among.low), min(int(among.high), self._n_segments - 1))
@@ -171,15 +163,6 @@ class _Search:
 
 def _rounded(value: float) -> float:
     return value if isinstance(value, int) else float(f"{value:.{DIGITS}g}")
-
-
-def _optuna() -> Any:
-    try:
-        import optuna
-    except ImportError:
-        raise MissingDependency("tuning needs Optuna: install it with  pip install 'annelid[tune]'") from None
-    optuna.logging.set_verbosity(optuna.logging.ERROR)
-    return optuna
 
 
 def write_entrants(entrants: Mapping[str, Entrant], path: Path) -> Path:

@@ -228,15 +228,15 @@ def challenge_command(
     trials.csv.
 
     With --train it trains a network for each body on training draws (pip install 'annelid[learn]'). It writes
-    policy.toml, a file of entrants, and the learning curves policy.csv and policy.png. It takes hours.
+    policy.toml, a file of entrants, and the learning curves policy.csv and policy.png. 2,000 steps take an hour or two.
 
     \b
     annelid study challenge --quick                             in minutes
     annelid study challenge                                     everything
     annelid study challenge mine:Controller --task slope        your own
-    annelid study challenge mine.toml --with published.csv      only yours runs
+    annelid study challenge mine.toml --with published.csv      run only yours
     annelid study challenge mine.toml --tune 32 -o tuned        tune it first
-    annelid study challenge --train 40000 -o trained            train a network
+    annelid study challenge --train 2000 -o trained             train a network
     """
     from annelid.experiment import study_progress
     from annelid_studies.challenge import report, tasks

@@ -41,11 +41,14 @@ class AnnelidSolver:
 
     def settings(self, scenario: Scenario, *, n_elements: int, n_frames: int) -> dict[str, object]:
         """Returns the step, s, and the damping, 1/s, that a quasi-static scenario is given."""
-        longest_s = self._step_s_per_m * min(rod.length for rod in scenario.rods) / n_elements
-        steps = math.ceil(scenario.duration / (n_frames - 1) / longest_s)
-        damping = 2.0 * scenario.slowest_frequency() if scenario.quasi_static else 0.0
-        step_s = scenario.duration / (n_frames - 1) / steps
-        return {"integrator": "BDF2", "time_step": step_s, "steps_per_frame": steps, "damping_rate": damping}
+        step_s, _ = self._steps(scenario, n_elements, n_frames)
+        return {"integrator": "BDF2", "time_step": step_s, "damping_rate": _damping_per_s(scenario)}
+
+    def _steps(self, scenario: Scenario, n_elements: int, n_frames: int) -> tuple[float, int]:
+        """The step, s, and how many of them are between two frames."""
+        frame_s = scenario.duration / (n_frames - 1)
+        n_steps = math.ceil(frame_s * n_elements / self._step_s_per_m / min(rod.length for rod in scenario.rods))
+        return frame_s / n_steps, n_steps
 
     def run(self, scenario: Scenario, *, n_elements: int, n_frames: int) -> Trajectory:
         """Returns nodes and directors over time.
@@ -54,8 +57,7 @@ class AnnelidSolver:
             Diverged: If a node is no longer a number.
             NotImplementedError: For ends that turn across the rod or slide in no direction of the axes.
         """
-        numbers = self.settings(scenario, n_elements=n_elements, n_frames=n_frames)
-        step_s, damping = float(str(numbers["time_step"])), float(str(numbers["damping_rate"]))
+        step_s, n_steps = self._steps(scenario, n_elements, n_frames)
         rods = scenario.rods
         ahead, behind = (rods[0].condition(end) is EndCondition.CLAMPED for end in End)
         if any((rod.start, rod.end) != (rods[0].start, rods[0].end) for rod in rods):
@@ -67,36 +69,30 @@ class AnnelidSolver:
         shares[:, 0] *= 1 + ahead
         shares[:, -1] *= 1 + behind
         lengths = np.linalg.norm(np.diff(nodes, axis=1), axis=-1)
-        held = [
-            hold
-            for number, rod in enumerate(rods)
-            for hold in _holds(f"strand_{number}", rod, nodes[number], n_elements)
-        ]
+        held = [hold for number, rod in enumerate(rods) for hold in _holds(f"strand_{number}", rod, nodes[number])]
         spec = mujoco.MjSpec()
         spec.option.integrator, spec.option.solver = mujoco.mjtIntegrator.mjINT_DISCRETE, mujoco.mjtSolver.mjSOL_NEWTON
         spec.option.iterations, spec.option.tolerance = SOLVER_ITERATIONS, SOLVER_TOLERANCE
         spec.option.timestep, spec.option.gravity = BDF2_SHARE * step_s, scenario.gravity
         straight = np.zeros_like(nodes)
         straight[:, 1:, 0] = np.cumsum(lengths, axis=1)
-        stiffness = []
         names = [[f"strand_{number}_{node}" for node in range(nodes.shape[1])] for number in range(len(rods))]
         for places, bodies, rod in zip(straight, names, rods, strict=True):
             # A rod that begins stretched has the mass of its length at rest.
-            density = rod.material.density * rod.area * rod.length / n_elements
-            for name, place, mass in zip(
-                bodies, places, lumped_masses(np.arange(float(len(places)))[:, None], density), strict=True
-            ):
-                add_vertex(spec, name, place, float(mass))
-        for number, (places, bodies, rod) in enumerate(zip(straight, names, rods, strict=True)):
-            material = _strands(rod)
-            stiffness.append(vertex_stiffness(lengths[number], material, shares))
-            add_rod(spec, f"strand_{number}", places, bodies, material, step_s, stiffness_Nm=stiffness[-1])
+            element_kg = rod.material.density * rod.area * rod.length / n_elements
+            masses = lumped_masses(np.arange(float(len(places)))[:, None], element_kg)
+            for name, place, mass in zip(bodies, places, masses.tolist(), strict=True):
+                add_vertex(spec, name, place, mass)
+        materials = [_strands(rod) for rod in rods]
+        stiffness = [vertex_stiffness(*each, shares) for each in zip(lengths, materials, strict=True)]
+        for number, (places, bodies, material) in enumerate(zip(straight, names, materials, strict=True)):
+            add_rod(spec, f"strand_{number}", places, bodies, material, step_s, stiffness_Nm=stiffness[number])
         for joint, _, _ in held:
             limits = {"solref": [2.0 * step_s, 1.0], "solimp": [0.9999, 0.9999, 0.001, 0.5, 2.0]}
             add_row(spec, mujoco.mjtEq.mjEQ_JOINT, mujoco.mjtObj.mjOBJ_JOINT, f"hold_{joint}", joint, **limits)
         tendons_to_rows(spec)
         model = spec.compile()
-        model.dof_damping[: nodes.size] = damping * model.body_mass[model.dof_bodyid[: nodes.size]]
+        model.dof_damping[: nodes.size] = _damping_per_s(scenario) * model.body_mass[model.dof_bodyid[: nodes.size]]
         data = mujoco.MjData(model)
         strains = RodStrains(model, np.stack(stiffness, axis=1), 0.0)
         two_step = TwoStep(model, data, strains, first_order=False)
@@ -115,7 +111,7 @@ class AnnelidSolver:
 
         positions, directors = [nodes], [strains.director.copy()]
         for frame in range(1, n_frames):
-            for _ in range(int(str(numbers["steps_per_frame"]))):
+            for _ in range(n_steps):
                 two_step.step(hold)
                 data.time += step_s - model.opt.timestep
             positions.append(straight + data.qpos[: nodes.size].reshape(nodes.shape))
@@ -129,6 +125,11 @@ class AnnelidSolver:
             tuple(np.stack(positions, axis=1)[..., own, :]),
             tuple(np.stack(directors).transpose(2, 0, 3, 1)[..., edges, :]),
         )
+
+
+def _damping_per_s(scenario: Scenario) -> float:
+    """Damping in proportion to mass by which a quasi-static scenario comes to rest, 1/s."""
+    return 2.0 * scenario.slowest_frequency() if scenario.quasi_static else 0.0
 
 
 def _continued(nodes: Array, ahead: bool, behind: bool) -> Array:
@@ -148,7 +149,7 @@ def _strands(rod: Rod) -> Strands:
     )
 
 
-def _holds(name: str, rod: Rod, nodes: Array, n_elements: int) -> Iterator[Hold]:
+def _holds(name: str, rod: Rod, nodes: Array) -> Iterator[Hold]:
     """The coordinates of a rod's ends that are held or moved."""
     n_edges = len(nodes) - 1
     for end, first, on in ((End.START, 0, 1), (End.END, n_edges, -1)):

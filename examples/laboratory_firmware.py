@@ -1,7 +1,6 @@
 """A laboratory's firmware, unmodified, drives the twin of its robot; path, heading and slip stand beside its plan.
 
     python examples/laboratory_firmware.py SEC_ver2.ino folder
-    python examples/laboratory_firmware.py SEC_ver2.ino slippery arena.friction=0.3
 
 Fetches nothing (docs/how_to/laboratory_firmware.md says where the file is). Needs a C++ compiler. Takes some minutes.
 """
@@ -17,7 +16,6 @@ import numpy as np
 
 from annelid import load_config, simulate
 from annelid.analysis import track_of
-from annelid.config import parse_assignments
 from annelid.draw import canvas, save
 from annelid_lab.loop import Wheels, Wiring
 
@@ -27,8 +25,8 @@ SERVOS = (7, 1, 8, 2, 9, 3, 10, 4, 11, 5, 12, 6)  # a guess: 1 to 6 are right
 HEAD = "wave,path_m,heading_deg,slip_m,plan_path_m,plan_heading_deg"
 
 
-def main(sketch: Path, folder: Path, *assignments: str) -> None:
-    """Compiles and runs the firmware, drives the twin, with fields of it set, and shows what each wave did."""
+def main(sketch: Path, folder: Path, worm: str = "cmmworm-s") -> None:
+    """Compiles and runs the firmware, drives the twin, prints and writes what each wave did, and draws its path."""
     if (found := sha256(sketch.read_bytes()).hexdigest()) != KNOWN.get(sketch.name, found):
         raise SystemExit(f"{sketch} has the SHA-256 {found}: take the file of commit f823c31")
     folder.mkdir(parents=True, exist_ok=True)
@@ -38,8 +36,7 @@ def main(sketch: Path, folder: Path, *assignments: str) -> None:
     ends = np.array([*sorted({time for time, _, word in words if word % 1024})[::6], words[-1][0]])[:11]
     wiring = Wiring(0, round(-1.92 * 4096), protocol=1, is_wheel=True, rpm_per_unit=97 / 1023)  # 9 mm: a guess
     wheels = Wheels(words, SERVOS, wiring, cable_m=0.1085, stall_torque_Nm=1.8)
-    config = load_config("cmmworm-s", {"duration_s": round(ends[-1], 1), **parse_assignments(assignments)})
-    result = simulate(config, folder / "run", controller=wheels)
+    result = simulate(load_config(worm, {"duration_s": round(ends[-1], 1)}), folder / "run", controller=wheels)
     track, slid_m = track_of(result), result.variables["slip_distance"].values.mean(axis=1)
     motion = (*(track.middle_m[0] - track.middle_m).T, np.degrees(track.heading_rad))  # it starts towards -x
     twin = np.array([np.interp(ends, track.time_s, one) for one in motion])

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from annelid.experiment.progress import LINE_EVERY_S, Lines, study_progress
-from annelid_studies.riddle2023.report_parts import Claim, Report, Table
+from annelid_studies.papers.report_parts import Claim, Report, Table
 from annelid_studies.standard_cases import Effort
 from outcome import Command
 

@@ -14,8 +14,8 @@ from annelid.draw.canvas import canvas, save_both
 from annelid.errors import RunFileError
 from annelid.markdown import anchors, cell, code, words
 from annelid.text import printable
-from annelid_studies.riddle2023.report import CLAIMS_COMMAND, claims_page, write_report
-from annelid_studies.riddle2023.report_parts import (
+from annelid_studies.papers.report import CLAIMS_COMMAND, claims_page, write_report
+from annelid_studies.papers.report_parts import (
     Claim,
     Examination,
     Examined,

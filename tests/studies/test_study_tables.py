@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 from rich.console import Console
 from rich.table import Table
@@ -47,7 +49,7 @@ def test_no_cell_breaks_at_80_columns(study: str) -> None:
     lines = capture.get().splitlines()
     assert max(map(len, lines)) <= 80
     assert len(table.columns) <= 8
-    shown = {" ".join(cell.split()) for line in lines for cell in line.replace("┃", "│").split("│")}
+    shown = {cell for line in lines for cell in re.split(" {2,}", line.strip())}
     words = {word for cell in shown for word in cell.split()}
     for column in table.columns:
         assert set(str(column.header).split()) <= words

@@ -299,8 +299,7 @@ def challenge_command(
         report.write_rows(Pair, compared, output / "pairs.csv"),
         report.ranking_figure(scores, output / "challenge"),
     ]
-    tables = [report.ranking_table(ranked, changes), report.speed_table(ranked)]
-    tables.append(report.pairs_table(compared, tasks.REFERENCE))
+    tables = [report.ranking_table(ranked, changes), *report.speed_tables(ranked), report.pairs_table(compared)]
     if of_own:
         tables.append(report.own_bodies_table([one for one in of_own if one.finer == 1]))
     if any(one.refused for one in every):

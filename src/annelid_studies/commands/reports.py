@@ -85,7 +85,7 @@ def paper_command(
         effort = "quick" if quick else "full"
         report = reproduce(output, effort, executor=store.executor, progress=store.progress, **examinations)
         html = write_report(report, output)
-    written = [html, html.with_suffix(".md")]
+    written = [html, html.with_suffix(".md"), *report.files]
     if claims is not None:
         written.append(write_text(claims, claims_page(report)))
     found = {

@@ -127,3 +127,4 @@ class Report:
     examinations: Sequence[Examined]  # The examinations in the order of the report
     provenance: Mapping[str, str]  # Versions, number of runs, processor time: label and value
     rule: Sequence[str] = ()  # Paragraphs that say how the claims are judged
+    files: Sequence[Path] = ()  # Further files that were written

@@ -16,7 +16,18 @@ from annelid.analysis import mean_and_interval
 from annelid_studies.papers.judging import Judgement, claim_of, judged, near
 from annelid_studies.papers.report_parts import Claim
 from annelid_studies.papers.words import CM, PERCENT, filled, in_unit, texts
-from annelid_studies.riddle2025.runs import DRAWS, NARROW_M, SOFT, STIFF, STRAIGHT_M, WIDE_M, Point, Reading, cases
+from annelid_studies.riddle2025.runs import (
+    DRAWS,
+    NARROW_M,
+    SOFT,
+    STIFF,
+    STRAIGHT_M,
+    TIGHT_M,
+    WIDE_M,
+    Point,
+    Reading,
+    cases,
+)
 from annelid_studies.standard_cases import Effort
 from annelid_studies.tables import grouped
 
@@ -29,8 +40,8 @@ STRAIGHT_LABEL_M_PER_S = 0.0415
 """Where the label of the straight pipe's speed stands on that axis, its lower edge above the line that it names."""
 SMALLEST_DRAWN_M: Mapping[str, float] = {"3x1": 0.7, "3x1, touch": 0.5}
 """Smallest radius, of 0.5 to 1.3 m, whose speed that figure has; smaller ones are taken out in the script."""
-CROSSING_M, TIGHT_M = 0.45, 0.3
-"""Radius above which the paper has stiff bodies faster, and that which it has soft ones pass alone."""
+CROSSING_M = 0.45
+"""Radius above which the paper has stiff bodies faster."""
 FRAME_N: Mapping[float, float] = {2.0: 16.05, 1.0: 9.34, 0.3: 4.71}
 """Largest force of the authors' simulated load frame, by Young's modulus, GPa (`Seg3_no_pipe_0.0f_*.csv`)."""
 LOOSE_N, TIGHT_N = 15.97, 22.5
@@ -42,6 +53,7 @@ DEPENDS = {
     "modulus_GPa": "the stiffness",
     "friction": "the friction",
     "radius_m": "the radius",
+    "half_step": "the step",
 }
 """Fields of a point that a verdict may depend on."""
 Estimate = tuple[float, float, float]
@@ -98,15 +110,15 @@ def claims(evidence: Evidence) -> list[Claim]:
 def rule(evidence: Evidence, effort: Effort) -> list[str]:
     """Says how all claims are judged."""
     halved = [
-        evidence.gain(point, point._replace(half_step=False))[0] / evidence.speed(point)[0]
-        for point in evidence.runs
-        if point.half_step
+        (evidence.speed(one)[0], evidence.gain(one, one._replace(half_step=False))[0])
+        for one in evidence.runs
+        if one.half_step
     ]
     problems = [one for one in evidence.readings if one.problem]
     found = {
         "draws": DRAWS[effort],
         "halved": len(halved),
-        "apart": max(map(abs, halved), default=None),
+        "apart": max((abs(change / speed) for speed, change in halved if speed), default=None),
         "doubtful": f"{len(problems)} of {len(evidence.readings)}",
     }
     text = texts(CLAIMS_TOML)["rule"]
@@ -232,7 +244,8 @@ def wide_bends(evidence: Evidence) -> Judgement:
 @judges
 def tight_bend(evidence: Evidence) -> Judgement:
     """The soft worm comes out of the tight bend, and no other does."""
-    tight = evidence.points(bore_m=NARROW_M, radius_m=TIGHT_M)
+    at = {"bore_m": NARROW_M, "radius_m": TIGHT_M}
+    tight = [*evidence.points(**at), *evidence.points(**at, half_step=True)]
     return out_of_bends(evidence, {point: point.modulus_GPa == SOFT for point in tight})
 
 

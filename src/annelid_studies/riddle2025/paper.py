@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -46,7 +47,7 @@ def reproduce(
     """Runs what the claims need, as far as it has not been run into the folder before.
 
     Args:
-        folder: The report's folder: runs go to ``runs``, the picture and ``riddle2025.csv`` to ``figures``.
+        folder: The report's folder: it has ``runs``, ``figures``, and ``riddle2025.csv`` with a row for each run.
         effort: ``"quick"`` for one run of a few points, ``"full"`` for all.
         executor: Who computes the runs; None for a process of this machine on every core.
         progress: Called as the work goes on.
@@ -63,7 +64,6 @@ def reproduce(
     words = texts(judging.CLAIMS_TOML)
     stem = folder / "figures" / "riddle2025"
     stem.parent.mkdir(exist_ok=True)
-    write_fields(Reading, readings, stem.with_suffix(".csv"))
     picture = Figure(
         1, words["figure"]["title"], speeds_picture(readings, stem), filled(words["figure"]["caption"], {})
     )
@@ -79,16 +79,14 @@ def reproduce(
         examinations=[],
         provenance=provenance(outcomes.values()),
         rule=judging.rule(evidence, effort),
+        files=[write_fields(Reading, readings, folder / "riddle2025.csv")],
     )
 
 
 def peaks_N() -> dict[tuple[float, float], float]:
     """Closes our load frame, and returns its largest force, N, by Young's modulus, GPa, and friction of a pin, N m."""
     peaks = {}
-    for modulus, friction in [
-        *((one, 0.0) for one in runs.MODULI_GPA),
-        *((runs.STIFF, one) for one in judging.PIN_FRICTIONS_NM),
-    ]:
+    for modulus, friction in {*product(runs.MODULI_GPA, [0.0]), *product([runs.STIFF], judging.PIN_FRICTIONS_NM)}:
         changes = {**runs.stiffness(modulus), "body.joints.dry_friction_Nm": friction}
         loop = load_frame(Case("riddle2025-muscles", changes).config, displacement_m=FRAME_DISPLACEMENT_M)
         peaks[modulus, friction] = float(loop.force_N.max())
@@ -132,9 +130,14 @@ def points_table(readings: Sequence[Reading]) -> Table:
         ),
         "ring 1 out": lambda one: str(sum(run.came_out for run in one[1])) if one[0].radius_m else "",
         "farthest (m)": lambda one: span(run.front_m for run in one[1]),
-        "doubts": lambda one: "; ".join(dict.fromkeys(run.problem for run in one[1] if run.problem)),
+        "doubts": lambda one: _doubts(one[1]),
     }
     return tabulated(grouped(readings, lambda one: one.point).items(), columns)
+
+
+def _doubts(of: Sequence[Reading]) -> str:
+    problems = [one.problem for one in of if one.problem]
+    return f"{len(problems)} of {len(of)} runs: {problems[0]}" if problems else ""
 
 
 def speeds_picture(readings: Sequence[Reading], stem: Path) -> Path:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from annelid.analysis import Passage, Track, passage_of, track_of
+from annelid.analysis import Track, passage_of, track_of
 from annelid.experiment import Case, Outcome, Store
 from annelid.morphology import Array
 from annelid.simulation import Run
@@ -44,6 +44,8 @@ NARROW_M, WIDE_M = 0.16, 0.20
 """Radii of the authors' pipes of 2025 and of 2026."""
 RADII_M: Mapping[str, tuple[float, ...]] = {"servos": (0.3, 0.4, 0.5, 0.7), "muscles": (0.3, 0.5)}
 """Of the bends' centre lines in the narrow pipe; the authors have 0.2, 0.3, .. 0.9 m."""
+TIGHT_M = 0.3
+"""Radius of the bend that the paper has soft worms pass alone."""
 WIDE_RADII_M = (0.5, 0.7, 1.3)
 """In the wide one; the authors have 0.5, 0.6, .. 1.3 m."""
 STRAIGHT_M = 0.25
@@ -110,7 +112,7 @@ class Reading:
 
 
 def points(effort: Effort) -> list[Point]:
-    """Lays out the points, and in a full report every fourth once more at half the step."""
+    """Lays out the points; in a full report every fourth, and all tight bends, once more at half the step."""
     if effort == "quick":
         flat = [Point(modulus_GPa=modulus, friction=mu) for modulus in (STIFF, SOFT) for mu in (0.1, 1.0)]
         bends = [
@@ -122,11 +124,12 @@ def points(effort: Effort) -> list[Point]:
     whole += [Point("2x2", friction=mu) for mu in (0.3, 0.7)]
     for rings, radii in RADII_M.items():
         whole += [Point("3x1", rings, E, 0.3, NARROW_M, r) for E, r in product((STIFF, SOFT), radii)]
-    whole += [Point(modulus_GPa=1.0, bore_m=NARROW_M, radius_m=0.3)]
+    whole += [Point(modulus_GPa=1.0, bore_m=NARROW_M, radius_m=TIGHT_M)]
     whole += [Point(gait, bore_m=WIDE_M) for gait in ("3x1", "3x1, as in 2026")]
     whole += [Point(bore_m=WIDE_M, radius_m=r) for r in WIDE_RADII_M]
     whole += [Point("3x1, touch", bore_m=WIDE_M, radius_m=0.5)]
-    return [*whole, *(point._replace(half_step=True) for point in whole[::4])]
+    finer = [one for i, one in enumerate(whole) if i % 4 == 0 or one.radius_m == TIGHT_M]
+    return [*whole, *(point._replace(half_step=True) for point in finer)]
 
 
 def stiffness(modulus_GPa: float) -> dict[str, float]:
@@ -168,27 +171,15 @@ def _read(point: Point, case: Case, outcome: Outcome, run: Run) -> Reading:
     if outcome.message:
         return Reading(*point, friction, nan, nan, False, f"stopped: {outcome.message}")
     if point.radius_m:
-        found = through_bend(passage_of(run))
+        passage = passage_of(run)
+        farthest = float(passage.front_m.max())
+        found = passage.speed_m_per_s(), farthest, farthest >= passage.reach_m[1]
     else:
         track = track_of(run)
         place = ahead_m(track)
         speed = speed_of_line(*repeated(track.time_s, place, cycle_s(point), AUTHORS_FLAT_S))
         found = speed, float(place[-1]), False
     return Reading(*point, friction, *found, "; ".join(outcome.summary.warnings))
-
-
-def through_bend(passage: Passage) -> tuple[float, float, bool]:
-    """Returns the speed of the foremost ring in a bend, m/s, how far it came, m, and whether it came out.
-
-    Of a worm that does not come out the speed is that up to the farthest point, as in the authors' scripts.
-    """
-    front, last = passage.front_m, int(passage.front_m.argmax())
-    farthest = float(front[last])
-    if farthest >= passage.reach_m[1]:
-        return passage.speed_m_per_s(), farthest, True
-    first = int((front >= passage.reach_m[0]).argmax()) if farthest >= passage.reach_m[0] else last
-    time = float(passage.time_s[last] - passage.time_s[first])
-    return (farthest - float(front[first])) / time if time else 0.0, farthest, False
 
 
 def ahead_m(track: Track) -> Array:

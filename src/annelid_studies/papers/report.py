@@ -56,7 +56,7 @@ def claims_page(report: Report) -> str:
     intro = (
         f"What the paper, {emphasis(paper.name)} ({paper.authors}), shows and claims, beside what annelid measures. "
         f"Every number of ours comes from a run; this page is written by {code(paper.command)}, together with the "
-        f"whole report: its figures{' and its examinations' if report.examinations else ''}."
+        f"whole report{': its figures and its examinations' if report.examinations else ''}."
     )
     found = [f"- {strong(f'{one.examination.title}.')} {words(one.findings.answer)}" for one in report.examinations]
     answers = ["## What the examinations found", "\n".join(found)] if found else []
@@ -73,7 +73,7 @@ def _contents(blocks: Iterable[str]) -> str:
 
 
 def _provenance(report: Report) -> str:
-    effort = "Quick report, with coarser maps than the full one" if report.effort == "quick" else "Full report"
+    effort = "Quick report, from fewer runs than the full one" if report.effort == "quick" else "Full report"
     return " · ".join([effort, *(f"{words(label)} {words(value)}" for label, value in report.provenance.items())])
 
 

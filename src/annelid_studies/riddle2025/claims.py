@@ -190,8 +190,8 @@ def within(evidence: Evidence, points: Sequence[Point], limits: tuple[float, flo
     )
 
 
-def out_of_bends(evidence: Evidence, wanted: Mapping[Point, bool]) -> Judgement:
-    """Judges whether all runs of each point come out of the bend, or none, as wanted."""
+def out_of_bends(evidence: Evidence, wanted: Mapping[Point, bool]) -> list[tuple[Point, bool, str]]:
+    """Says of each point whether all of its runs come out of the bend, or none, as wanted, and how many do."""
     found = []
     for point, out in wanted.items():
         runs = evidence.runs[point]
@@ -201,7 +201,7 @@ def out_of_bends(evidence: Evidence, wanted: Mapping[Point, bool]) -> Judgement:
             f"{point.worm}, {point.radius_m:g} m: {n} of {len(runs)} out, front at {front} m, the end at {end_m:.2f} m"
         )
         found.append((point, all(one.came_out == out for one in runs), said))
-    return judgement(found)
+    return found
 
 
 @judges
@@ -246,7 +246,9 @@ def tight_bend(evidence: Evidence) -> Judgement:
     """The soft worm comes out of the tight bend, and no other does."""
     at = {"bore_m": NARROW_M, "radius_m": TIGHT_M}
     tight = [*evidence.points(**at), *evidence.points(**at, half_step=True)]
-    return out_of_bends(evidence, {point: point.modulus_GPa == SOFT for point in tight})
+    found = out_of_bends(evidence, {point: point.modulus_GPa == SOFT for point in tight})
+    worms = grouped(found, lambda one: (one[0].rings, one[0].half_step)).values()
+    return judgement([(of[0][0], all(has for _, has, _ in of), "; ".join(said for *_, said in of)) for of in worms])
 
 
 @judges
@@ -289,4 +291,4 @@ def straight(evidence: Evidence) -> Judgement:
 def drawn_radii(evidence: Evidence) -> Judgement:
     """Worms come out of the bends that their figure draws, and of no other."""
     wide = [point for gait in SMALLEST_DRAWN_M for point in evidence.points(gait=gait, bore_m=WIDE_M) if point.radius_m]
-    return out_of_bends(evidence, {point: point.radius_m >= SMALLEST_DRAWN_M[point.gait] for point in wide})
+    return judgement(out_of_bends(evidence, {one: one.radius_m >= SMALLEST_DRAWN_M[one.gait] for one in wide}))

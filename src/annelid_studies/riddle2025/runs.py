@@ -133,7 +133,9 @@ def points(effort: Effort) -> list[Point]:
 
 
 def stiffness(modulus_GPa: float) -> dict[str, float]:
-    """Returns the changes that give the strands a Young's modulus of the authors' files, and its shear modulus."""
+    """Returns what gives the presets' strands another Young's modulus of the authors' files, with its shear modulus."""
+    if modulus_GPa == STIFF:
+        return {}
     moduli = {"young_modulus_Pa": modulus_GPa, "shear_modulus_Pa": MODULI_GPA[modulus_GPa]}
     return {f"body.strands.{name}": 1e9 * value for name, value in moduli.items()}
 

@@ -242,7 +242,7 @@ def challenge_command(
     trials.csv.
 
     With --train it trains a network for each body on training draws (pip install 'annelid[learn]'). It writes
-    policy.toml, a file of entrants, and the learning curves policy.csv and policy.png. 2,000 steps take an hour or two.
+    policy.toml, a file of entrants, and the learning curves policy.csv and policy.png. 10,000 steps take half an hour.
 
     \b
     annelid study challenge --quick                             in minutes
@@ -250,7 +250,7 @@ def challenge_command(
     annelid study challenge mine:Controller --task slope        your own
     annelid study challenge mine.toml --with published.csv      run only yours
     annelid study challenge mine.toml --tune 32 -o tuned        tune it first
-    annelid study challenge --train 2000 -o trained             train a network
+    annelid study challenge --train 10000 -o trained            train a network
     """
     from annelid.experiment import study_progress
     from annelid_studies.challenge import report, tasks

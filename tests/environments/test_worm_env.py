@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from worms import CHEAP, same
 
 from annelid.body.worm import WormBody
+from annelid.control.open_loop import TimedWave
 from annelid.environments import ENVIRONMENTS, WormEnv
 from annelid.environments.task import WEIGHTS
 from annelid.errors import AnnelidError, ConfigError, MissingDependency
@@ -189,6 +190,17 @@ def test_the_worm_is_the_presets_at_its_own_resolution_if_wanted() -> None:
         assert isinstance(made.task.config.body, WormBody)
         assert made.task.config.body.mesh.elements_per_side == elements
         assert made.task.moves_per_step == round(0.12 / step_s)
+
+
+def test_the_body_for_learning_acts_and_senses_as_the_fine_one_and_bears_fast_waves() -> None:
+    coarse, fine = (
+        WormEnv(preset, fidelity=None, interval_s=0.08) for preset in ("riddle2023-rods-coarse", "riddle2023-rods")
+    )
+    assert coarse.layout.entries == fine.layout.entries
+    assert coarse.worm.total_mass_kg == pytest.approx(fine.worm.total_mass_kg, rel=0.02)
+    coarse.reset(seed=0)
+    for action in TimedWave(rise_s=0.16, hold_s=0.05, fall_s=0.16, interval_s=0.27).activation(0.08 * np.arange(13), 3):
+        assert coarse.step(action)[4]["stopped"] == ""
 
 
 REFUSED: list[tuple[dict[str, Any], str]] = [

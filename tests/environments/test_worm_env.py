@@ -15,7 +15,6 @@ from hypothesis import strategies as st
 from worms import CHEAP, same
 
 from annelid.body.worm import WormBody
-from annelid.control.open_loop import TimedWave
 from annelid.environments import ENVIRONMENTS, WormEnv
 from annelid.environments.task import WEIGHTS
 from annelid.errors import AnnelidError, ConfigError, MissingDependency
@@ -192,15 +191,17 @@ def test_the_worm_is_the_presets_at_its_own_resolution_if_wanted() -> None:
         assert made.task.moves_per_step == round(0.12 / step_s)
 
 
-def test_the_body_for_learning_acts_and_senses_as_the_fine_one_and_bears_fast_waves() -> None:
+def test_the_body_for_learning_senses_as_the_fine_one_and_bears_random_actions() -> None:
+    """With the fine body's muscles, such long steps break down in the 71st step."""
     coarse, fine = (
-        WormEnv(preset, fidelity=None, interval_s=0.08) for preset in ("riddle2023-rods-coarse", "riddle2023-rods")
+        WormEnv(preset, {"arena.friction": 0.6}, fidelity=None, interval_s=0.08)
+        for preset in ("riddle2023-rods-coarse", "riddle2023-rods")
     )
     assert coarse.layout.entries == fine.layout.entries
     assert coarse.worm.total_mass_kg == pytest.approx(fine.worm.total_mass_kg, rel=0.02)
     coarse.reset(seed=0)
-    for action in TimedWave(rise_s=0.16, hold_s=0.05, fall_s=0.16, interval_s=0.27).activation(0.08 * np.arange(13), 3):
-        assert coarse.step(action)[4]["stopped"] == ""
+    coarse.action_space.seed(0)
+    assert not any(coarse.step(coarse.action_space.sample())[2] for _ in range(75))
 
 
 REFUSED: list[tuple[dict[str, Any], str]] = [

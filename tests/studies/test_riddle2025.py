@@ -140,6 +140,8 @@ def test_a_difference_is_of_the_same_draws_and_a_stopped_run_decides_nothing() -
     assert verdict == "does not hold"
     assert words["having"] == 0
     assert claims.gaits(Evidence(runs, {}))[0] == ("not testable here", "")
+    stuck = [Reading(*stiff._replace(radius_m=0.3), 0.3, nan, nan, False, "stopped: a reason")]
+    assert claims.tight_bend(Evidence(stuck, {}))[0] == ("does not hold", "")
     assert "1 of 6" in claims.rule(Evidence(runs, {}), "full")[-1]
 
 

@@ -15,6 +15,15 @@ Judgement = tuple[tuple[Verdict, str], Mapping[str, Any]]
 E = TypeVar("E")
 
 
+class Judges(dict[str, Callable[[E], Judgement]]):
+    """What judges a claim, by its name in a file of words."""
+
+    def judge(self, function: Callable[[E], Judgement]) -> Callable[[E], Judgement]:
+        """Marks the function that judges the claim of its name."""
+        self[function.__name__] = function
+        return function
+
+
 def claim_of(
     text: Mapping[str, Any], judge: Callable[[E], Judgement] | None, evidence: E, commands: Mapping[str, str]
 ) -> Claim:

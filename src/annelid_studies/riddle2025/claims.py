@@ -6,14 +6,14 @@ open and judges it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from math import isfinite, pi
 
 from annelid.analysis import mean_and_interval
-from annelid_studies.papers.judging import Judgement, claim_of, judged, near
+from annelid_studies.papers.judging import Judgement, Judges, claim_of, judged, near
 from annelid_studies.papers.report_parts import Claim
 from annelid_studies.papers.words import CM, PERCENT, filled, in_unit, texts
 from annelid_studies.riddle2025.runs import (
@@ -91,14 +91,8 @@ class Evidence:
         return mean_and_interval([one.speed_m_per_s - its.speed_m_per_s for one, its in both])
 
 
-JUDGES: dict[str, Callable[[Evidence], Judgement]] = {}
-"""What judges a claim, by its name in ``claims.toml``."""
-
-
-def judges(function: Callable[[Evidence], Judgement]) -> Callable[[Evidence], Judgement]:
-    """Marks the function that judges the claim of its name."""
-    JUDGES[function.__name__] = function
-    return function
+JUDGES = Judges[Evidence]()
+judges = JUDGES.judge
 
 
 def claims(evidence: Evidence) -> list[Claim]:
@@ -200,7 +194,7 @@ def out_of_bends(evidence: Evidence, wanted: Mapping[Point, bool]) -> list[tuple
         said = (
             f"{point.worm}, {point.radius_m:g} m: {n} of {len(runs)} out, front at {front} m, the end at {end_m:.2f} m"
         )
-        found.append((point, all(one.came_out == out for one in runs), said))
+        found.append((point, all(isfinite(one.front_m) and one.came_out == out for one in runs), said))
     return found
 
 

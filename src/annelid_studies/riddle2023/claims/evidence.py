@@ -6,7 +6,7 @@ words leave open and judges it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
@@ -18,7 +18,7 @@ from annelid.experiment import Case, Outcome, Store
 from annelid.morphology import Array
 from annelid.simulation import Run
 from annelid_studies import slip
-from annelid_studies.papers.judging import EXACT, NEAR, Judgement, claim_of
+from annelid_studies.papers.judging import EXACT, NEAR, Judges, claim_of
 from annelid_studies.papers.report_parts import Claim, Findings
 from annelid_studies.papers.words import filled, texts
 from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, SOFT, WORMS, Worm
@@ -87,14 +87,8 @@ class Evidence:
         return [(self.store[case], self.store.run(case)) for case in cases]
 
 
-JUDGES: dict[str, Callable[[Evidence], Judgement]] = {}
-"""What judges a claim, by its name in ``claims.toml``."""
-
-
-def judges(function: Callable[[Evidence], Judgement]) -> Callable[[Evidence], Judgement]:
-    """Marks the function that judges the claim of its name."""
-    JUDGES[function.__name__] = function
-    return function
+JUDGES = Judges[Evidence]()
+judges = JUDGES.judge
 
 
 def judge(name: str, evidence: Evidence) -> Claim:

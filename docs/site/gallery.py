@@ -232,7 +232,7 @@ def _challenge(job: Job) -> Path:
 
 def makers() -> Mapping[str, Callable[[Job], Path]]:
     """All that an entry of the list can ask for."""
-    from annelid_studies import riddle2025
+    from annelid_studies.riddle2025 import paper, runs
 
     return {
         **dict.fromkeys(OF_ONE_RUN, _of_run),
@@ -241,7 +241,7 @@ def makers() -> Mapping[str, Callable[[Job], Path]]:
         "command": _command,
         "slip": _slip,
         "challenge": _challenge,
-        "riddle2025": partial(_fields, riddle2025.comparison_picture, riddle2025.Reading),
+        "riddle2025": partial(_fields, paper.speeds_picture, runs.Reading),
         "bench": _bench,
         "tuning": _tuning,
         "uncertainty": _uncertainty,

@@ -7,6 +7,7 @@ from dataclasses import astuple
 from pathlib import Path
 from typing import Any, TypeVar
 
+from rich.box import SIMPLE_HEAD
 from rich.table import Table as TerminalTable
 
 from annelid.markdown import Table
@@ -42,7 +43,7 @@ def records(table: Table) -> list[dict[str, str]]:
 
 def terminal_table(table: Table, title: str, *, n_words: int = 1, caption: str = "") -> TerminalTable:
     """Returns a table for the terminal, of columns of words, set flush left, and then columns of numbers."""
-    shown = TerminalTable(title=title, caption=caption or None)
+    shown = TerminalTable(title=title, caption=caption or None, box=SIMPLE_HEAD, pad_edge=False)
     for i, head in enumerate(table.header):
         # Heads of numbers stand one word a line: on a narrow terminal words fold before numbers do.
         name = head if i < n_words else head.replace(" ", "\n")

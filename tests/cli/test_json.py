@@ -70,7 +70,6 @@ STUDIES: dict[str, Fakes] = {
     "study slip-detector": {"annelid_studies.slip": {"slip_detection": {}, "scores": {}}},
     "study turning": {"annelid_studies.turning": {"turning": ([], [])}},
     "study pipes": {"annelid_studies.pipes": {"pass_pipes": ([], [])}},
-    "study riddle2025": {"annelid_studies.riddle2025": {"compare": []}},
     "study weak-middle": {"annelid_studies.weak_middle.results": {"weak_middle": ({}, [])}},
 }
 """Commands whose runs take minutes or more, with what stands in their place."""

@@ -82,7 +82,6 @@ LONG = {
     ("annelid", "study", "slip-detector"): ("minutes", ("--quick",)),
     ("annelid", "study", "turning"): ("many minutes", ("--quick",)),
     ("annelid", "study", "pipes"): ("an hour", ("--quick",)),
-    ("annelid", "study", "riddle2025"): ("an hour", ("--quick",)),
 }
 """Commands that only the slow tests execute: why, and what shortens them there."""
 

@@ -35,6 +35,12 @@ EXCEPTIONS = {
     ("docs/evidence/material.md", "source"): "published values",
     ("docs/evidence/paper.md", "quantity"): "the whole page is written by `annelid paper -o report --claims FILE.md`",
     ("docs/evidence/paper.md", "#"): "the same",
+    (
+        "docs/evidence/riddle2025.md",
+        "ground",
+    ): "the whole page is written by `annelid paper riddle2025 --claims FILE.md`",
+    ("docs/evidence/riddle2025.md", "quantity"): "the same",
+    ("docs/evidence/riddle2025.md", "#"): "the same",
     ("docs/troubleshooting.md", "code"): "exit codes, not results",
     ("docs/evidence/presets.md", "field"): "fields of a preset, which tests/test_presets.py compares with its sources",
     ("docs/evidence/validation.md", "formulation"): "printed by `pytest -m slow -s tests/body/test_ring_down.py`",

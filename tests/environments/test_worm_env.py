@@ -191,6 +191,19 @@ def test_the_worm_is_the_presets_at_its_own_resolution_if_wanted() -> None:
         assert made.task.moves_per_step == round(0.12 / step_s)
 
 
+def test_the_body_for_learning_senses_as_the_fine_one_and_bears_random_actions() -> None:
+    """With the fine body's muscles, such long steps break down in the 71st step."""
+    coarse, fine = (
+        WormEnv(preset, {"arena.friction": 0.6}, fidelity=None, interval_s=0.08)
+        for preset in ("riddle2023-rods-coarse", "riddle2023-rods")
+    )
+    assert coarse.layout.entries == fine.layout.entries
+    assert coarse.worm.total_mass_kg == pytest.approx(fine.worm.total_mass_kg, rel=0.02)
+    coarse.reset(seed=0)
+    coarse.action_space.seed(0)
+    assert not any(coarse.step(coarse.action_space.sample())[2] for _ in range(75))
+
+
 REFUSED: list[tuple[dict[str, Any], str]] = [
     ({"changes": {"controller.kind": "sine"}}, r"changes\['controller.kind'\] has no effect"),
     ({"changes": {"sensor.tolerance": 0.1}}, "has no effect"),

@@ -10,7 +10,7 @@ from annelid.analysis import RhythmScore
 from annelid.experiment.case import Case
 from annelid.experiment.outcome import Hold, Outcome
 from annelid.experiment.store import Store, case_key
-from annelid_studies.riddle2023.report_parts import Examination
+from annelid_studies.papers.report_parts import Examination
 from annelid_studies.standard_cases import Effort
 
 WAVE = RhythmScore("ordered", "a wave", (1, 2, 3, 1, 2, 3), 2.63, 0.01, 1.0, 1, 1, 1.0, 4.2)

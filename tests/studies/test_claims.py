@@ -13,11 +13,12 @@ from annelid.experiment.case import Case
 from annelid.experiment.outcome import Outcome, outcome
 from annelid.experiment.store import case_key
 from annelid.simulation.runfile import Run
+from annelid_studies.papers.judging import judged, near
+from annelid_studies.papers.report_parts import Examination, Findings
+from annelid_studies.papers.words import filled, texts
 from annelid_studies.riddle2023.claims import Evidence, judge
-from annelid_studies.riddle2023.claims.evidence import JUDGES, judged, near
+from annelid_studies.riddle2023.claims.evidence import CLAIMS_TOML, JUDGES
 from annelid_studies.riddle2023.examinations import EXAMINATIONS
-from annelid_studies.riddle2023.report_parts import Examination, Findings
-from annelid_studies.riddle2023.words import filled, texts
 from annelid_studies.standard_cases import FAST, Effort
 
 SIX_SPRINGS = (0.392, 0.302, 0.284, 0.334, 0.285, 0.322)
@@ -59,7 +60,7 @@ def test_a_property_holds_where_all_have_it() -> None:
 
 
 def test_every_claim_is_decided_in_its_words_or_by_a_function() -> None:
-    claims = texts("claims/claims.toml")["claims"]
+    claims = texts(CLAIMS_TOML)["claims"]
     assert {name for name, words in claims.items() if "verdict" not in words} == JUDGES.keys()
 
 

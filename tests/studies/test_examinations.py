@@ -17,6 +17,7 @@ from annelid.experiment.case import Case
 from annelid.experiment.outcome import Outcome, outcome
 from annelid.experiment.store import Store, case_key
 from annelid.simulation.runfile import Run
+from annelid_studies.papers.report_parts import Examination
 from annelid_studies.riddle2023.examinations import EXAMINATIONS, timestep
 from annelid_studies.riddle2023.examinations.design import RIGID, held_elongation
 from annelid_studies.riddle2023.examinations.discretization import convergence_order
@@ -26,7 +27,6 @@ from annelid_studies.riddle2023.examinations.noise import steady_tolerances as s
 from annelid_studies.riddle2023.examinations.pins import tie_stiffness_N_per_m
 from annelid_studies.riddle2023.examinations.ranges import EQUAL, RANGES, compiled_ranges
 from annelid_studies.riddle2023.examinations.timestep import EARLY_S, Start, read_start, start_case, velocity_limit
-from annelid_studies.riddle2023.report_parts import Examination
 from annelid_studies.standard_cases import CHAIN, chain, fast, one_after_the_other, rods
 
 pytestmark = pytest.mark.usefixtures("runs_in_this_process")

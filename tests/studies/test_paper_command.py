@@ -5,19 +5,22 @@ import os
 import shlex
 import sys
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from annelid.experiment.progress import LINE_EVERY_S, Lines, study_progress
-from annelid_studies.riddle2023.report_parts import Claim, Report, Table
+from annelid_studies.papers.report_parts import Claim, Report, Table
+from annelid_studies.riddle2023.paper import PAPER
+from annelid_studies.riddle2025.paper import PAPER as LATER
 from annelid_studies.standard_cases import Effort
 from outcome import Command
 
 CLAIM = Claim("results", "It walks", "Sect. 4", "2.635 s", "2.629 s", "It does.", "annelid run riddle2023", "holds")
 NUMBERS = Table(["period, s"], [["2.629"]])
-REPORT = Report("full", ["It walks."], NUMBERS, NUMBERS, [], [CLAIM], [], {"annelid": "0"})
+REPORT = Report(PAPER, "full", ["It walks."], NUMBERS, NUMBERS, [], [CLAIM], [], {"annelid": "0"})
 
 Asked = list[tuple[Path, Effort, Sequence[str] | None, int]]
 
@@ -52,6 +55,22 @@ def test_writes_the_report_and_prints_its_paths(annelid: Command, asked: Asked) 
     assert asked == [(Path("report"), "full", None, os.cpu_count())]
 
 
+def test_another_paper_has_a_folder_of_its_own(annelid: Command, asked: Asked, monkeypatch: pytest.MonkeyPatch) -> None:
+    folders: list[Path] = []
+
+    def reproduce(folder: Path, effort: Effort, **_: object) -> Report:
+        folders.append(folder)
+        return replace(REPORT, paper=LATER, files=[folder / "riddle2025.csv"])
+
+    monkeypatch.setattr("annelid_studies.riddle2025.paper.reproduce", reproduce)
+    done = annelid("paper", "riddle2025", "--claims", "claims.md", "-q")
+    assert done.out.split() == [f"riddle2025/{name}" for name in ("report.html", "report.md", "riddle2025.csv")] + [
+        "claims.md"
+    ]
+    assert Path("claims.md").read_text("utf-8").startswith("# The claims of the paper of 2025")
+    assert (folders, asked) == ([Path("riddle2025")], [])
+
+
 def test_hands_its_options_on(annelid: Command, asked: Asked) -> None:
     done = annelid("paper", "-o", "a/b", "--quick", "--only", "pins", "--only", "friction", "--jobs", "3", "-q")
     assert done.exit_code == 0, done.err
@@ -75,6 +94,8 @@ def test_writes_the_claims_where_they_are_wanted(annelid: Command, asked: Asked)
         (["--claims", "claims.md", "--only", "pins"], "--claims needs the whole report"),
         (["--claims", "nowhere/claims.md"], "there is no folder nowhere"),
         (["--claims", "claims.html"], "must end in .md"),
+        (["riddle2025", "--only", "pins"], "riddle2025 has none"),
+        (["riddle2022"], "'riddle2023', 'riddle2025'"),
         (["-o", "taken"], "taken is a file"),
     ],
 )

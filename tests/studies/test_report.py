@@ -14,8 +14,8 @@ from annelid.draw.canvas import canvas, save_both
 from annelid.errors import RunFileError
 from annelid.markdown import anchors, cell, code, words
 from annelid.text import printable
-from annelid_studies.riddle2023.report import CLAIMS_COMMAND, claims_page, write_report
-from annelid_studies.riddle2023.report_parts import (
+from annelid_studies.papers.report import claims_page, write_report
+from annelid_studies.papers.report_parts import (
     Claim,
     Examination,
     Examined,
@@ -25,6 +25,7 @@ from annelid_studies.riddle2023.report_parts import (
     Table,
     Verdict,
 )
+from annelid_studies.riddle2023.paper import PAPER
 
 COMMAND = """annelid run riddle2023 --set 'controller={kind = "program", ramp_s = 0.1}' --set arena.friction=0.3"""
 SPECIAL = "1 * 2 * 3 _a_ b_c `code|bar` <b>bold</b> |x| < 3 & [4](http://x) #5 ~6~ $7$ \\8 &lt; !"
@@ -109,6 +110,7 @@ def report(pictures: Path) -> Report:
     """A report on two pictures, ten claims and three examinations."""
     first, second = pictures / "figures" / "figure7.png", pictures / "figures" / "pins of soft.png"
     return Report(
+        PAPER,
         "full",
         ["It walks: 1-2-3.", "2. And yet it moves.", SPECIAL],
         Table(["quantity", "paper", "ours", "deviation"], [["period, s", "2.635", "2.629", "−0.2 %"]]),
@@ -196,7 +198,7 @@ def test_the_page_of_claims(report: Report) -> None:
 
     text = claims_page(report)
     page = Reading(f"<body>{MarkdownIt('commonmark').enable('table').render(text)}</body>")
-    assert CLAIMS_COMMAND in page.texts["code"]
+    assert PAPER.command in page.texts["code"]
     for each in report.claims:
         assert all(map(page.has, (each.claim, each.paper, each.ours, each.command)))
         assert page.has(each.evidence.replace("`", ""))

@@ -9,10 +9,10 @@ import pytest
 from annelid.errors import ConfigError
 from annelid.experiment.case import Case
 from annelid.experiment.store import Store
+from annelid_studies.papers.report_parts import Examination, Findings, Table
 from annelid_studies.riddle2023 import paper
 from annelid_studies.riddle2023.claims import claim_cases
 from annelid_studies.riddle2023.examinations import EXAMINATIONS
-from annelid_studies.riddle2023.report_parts import Examination, Findings, Table
 from annelid_studies.standard_cases import PLANAR, RODS, Effort, one_after_the_other
 
 pytestmark = pytest.mark.usefixtures("runs_in_this_process")

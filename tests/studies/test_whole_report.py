@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from annelid_studies.papers.report import claims_page, write_report
 from annelid_studies.riddle2023.paper import FIGURES, reproduce
-from annelid_studies.riddle2023.report import claims_page, write_report
 
 CLAIMS_THAT_HOLD = (
     "The wave runs from segment 1 to 3",

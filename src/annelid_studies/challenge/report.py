@@ -16,6 +16,7 @@ from annelid.markdown import Table
 from annelid.output import write_csv
 from annelid_studies.challenge.ranking import ALL, Array, Pair, Speeds, Standing, mean_ranks, standings
 from annelid_studies.challenge.scores import Score
+from annelid_studies.challenge.tasks import REFERENCE
 from annelid_studies.tables import grouped, tabulated, terminal_table
 
 CM = 100.0
@@ -36,6 +37,12 @@ def _with_interval(number: float, low: float, high: float) -> str:
     return f"{number:.2f}" + (f" ({low:.2f} .. {high:.2f})" if isfinite(low) else "")
 
 
+def _percent(share: float, low: float = nan, high: float = nan) -> str:
+    if not isfinite(share):
+        return "-"
+    return f"{100 * share:.0f}" + (f" ({100 * low:.0f} .. {100 * high:.0f})" if isfinite(low) else "")
+
+
 def _median(changes: Array | None) -> str:
     return "-" if changes is None else f"{np.median(np.abs(changes)):.1%}"
 
@@ -45,23 +52,31 @@ def ranking_table(found: Sequence[Standing], changes: Mapping[str, Array]) -> Te
     columns: Mapping[str, Callable[[Standing], str]] = {
         "entrant": lambda one: one.entrant,
         "speed over the reference's": lambda one: _with_interval(one.ratio, one.ratio_low, one.ratio_high),
-        "travels in order": lambda one: _with_interval(one.robust, one.robust_low, one.robust_high),
+        "in order": lambda one: f"{one.robust:.0%}",
         "refused": lambda one: f"{one.refused:.0%}",
         "slip (J/m)": lambda one: f"{one.slip_J_per_m:.3g}",
         "work (J/m)": lambda one: f"{one.work_J_per_m:.3g}",
         "half the step": lambda one: _median(changes.get(one.entrant)),
     }
     overall = [one for one in found if one.task == one.body == ALL]
-    caption = "with 95 % intervals over tasks and draws; half the step: median change of speed there"
+    caption = (
+        "with 95 % intervals over tasks and draws; in order: share of runs in which one wave travels; half the step: "
+        "median change of speed there"
+    )
     return terminal_table(tabulated(overall, columns), "All bodies and tasks", caption=caption)
 
 
-def speed_table(found: Sequence[Standing]) -> TerminalTable:
-    """Lays out mean speeds, a row for a task on a body and a column an entrant."""
-    names = [one.entrant for one in found if one.task == one.body == ALL]
-    cells = grouped((one for one in found if one.task != ALL), lambda one: (one.body, one.task))
-    rows = [[body, task, *(f"{CM * one.speed_m_per_s:.2f}" for one in own)] for (body, task), own in cells.items()]
-    return terminal_table(Table(["body", "task", *names], rows), "Mean speed (cm/s)", n_words=2)
+def speed_tables(found: Sequence[Standing]) -> list[TerminalTable]:
+    """Lays out mean speeds, a table for each body with a row for an entrant and a column for a task."""
+    tables = []
+    for body, own in grouped((one for one in found if ALL not in (one.body, one.task)), lambda one: one.body).items():
+        tasks = list(dict.fromkeys(one.task for one in own))
+        rows = [
+            [entrant, *(f"{CM * one.speed_m_per_s:.2f}" for one in each)]
+            for entrant, each in grouped(own, lambda one: one.entrant).items()
+        ]
+        tables.append(terminal_table(Table(["entrant", *tasks], rows), f"Mean speed of body {body} (cm/s)"))
+    return tables
 
 
 def own_bodies_table(scores: Sequence[Score]) -> TerminalTable:
@@ -115,17 +130,21 @@ def ranking_figure(scores: Sequence[Score], stem: Path) -> Path:
         return save_both(figure, stem)
 
 
-def pairs_table(found: Sequence[Pair], reference: str) -> TerminalTable:
-    """Lays out every entrant beside the reference: how often it is faster, and what half the step makes of it."""
+def pairs_table(found: Sequence[Pair]) -> TerminalTable:
+    """Lays out every entrant beside the reference, which is first of all, and what half the step makes of it."""
     columns: Mapping[str, Callable[[Pair], str]] = {
-        "entrants": lambda one: f"{one.first} - {one.second}",
+        "entrant": lambda one: one.second,
         "body": lambda one: one.body,
-        "difference": lambda one: _with_interval(one.difference, one.difference_low, one.difference_high),
-        "faster": lambda one: _with_interval(one.faster, one.faster_low, one.faster_high),
-        "slip": lambda one: _with_interval(one.slip, one.slip_low, one.slip_high),
-        "at half the step": lambda one: f"{one.at_half_step:+.2f}" if isfinite(one.at_half_step) else "-",
-        "same draws": lambda one: f"{one.at_step:+.2f}" if isfinite(one.at_step) else "-",
+        "slower by (%)": lambda one: _percent(one.difference, one.difference_low, one.difference_high),
+        "slower in (%)": lambda one: _percent(one.faster),
+        "one draw (%)": lambda one: _percent(one.at_step),
+        "half step (%)": lambda one: _percent(one.at_half_step),
+        "slip": lambda one: f"{1 / one.slip:.2f}" if isfinite(one.slip) else "-",
+        "work": lambda one: f"{1 / one.work:.2f}" if isfinite(one.work) else "-",
     }
-    rows = [one for one in found if one.task == ALL and reference in (one.first, one.second)]
-    caption = "difference of speeds over the reference's; faster: share of tasks and draws; slip: first over second"
-    return terminal_table(tabulated(rows, columns), f"Beside {reference}", n_words=2, caption=caption)
+    caption = (
+        "slower by: of the reference's speed, with a 95 % interval; slower in: share of tasks and draws; half step: "
+        "the one draw at half the step; slip, work: for a metre, over the reference's"
+    )
+    rows = [one for one in found if one.task == ALL and one.first == REFERENCE]
+    return terminal_table(tabulated(rows, columns), f"Beside {REFERENCE}", n_words=2, caption=caption)

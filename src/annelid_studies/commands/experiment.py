@@ -91,7 +91,6 @@ STUDIES = (
     Study("slip-detector", "slip", "detection", output="slip"),
     Study("turning", "turning"),
     Study("pipes", "pipes"),
-    Study("riddle2025", "riddle2025"),
     Study("weak-middle", "weak_middle.results"),
 )
 for _study in STUDIES:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict
+from importlib import import_module
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -30,13 +31,18 @@ from annelid.errors import RunFileError
 @command("paper", "")
 @study("paper")
 def paper_command(
-    output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the report.")] = Path("report"),
+    paper: Annotated[
+        Literal["riddle2023", "riddle2025"], typer.Argument(help="riddle2025: the paper on the robot of six segments.")
+    ] = "riddle2023",
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Folder of the report.  [default: report, or riddle2025]")
+    ] = None,
     quick: Annotated[
-        bool, typer.Option("--quick", help="The same claims from coarser maps, in about 6 minutes.")
+        bool, typer.Option("--quick", help="The same claims from fewer runs, in about 6 minutes.")
     ] = False,
     only: Annotated[
         list[str] | None,
-        typer.Option(metavar="NAME", help="Only the main numbers and this examination; may be repeated."),
+        typer.Option(metavar="NAME", help="Only the main numbers and this examination of riddle2023; may be repeated."),
     ] = None,
     jobs: Jobs = None,
     claims: Annotated[
@@ -50,28 +56,36 @@ def paper_command(
     with --quick about six minutes. Every run is kept in report/runs, so a second call continues where the first was
     stopped.
 
+    With riddle2025 each point is eight runs with frictions within one percent, and every fourth point is run once more
+    at half the step. The whole takes about two hours on two cores.
+
     \b
     annelid study paper                              into the folder report
     annelid study paper --quick -o draft             from coarser maps
     annelid study paper --only pins --only friction  these examinations only
     annelid study paper --claims docs/evidence/paper.md  for the repository
+    annelid study paper riddle2025 --quick           few runs of the later paper
     """
     from annelid.output import with_suffix, write_text
-    from annelid_studies.riddle2023.paper import reproduce
-    from annelid_studies.riddle2023.report import claims_page, write_report
+    from annelid_studies.papers.report import claims_page, write_report
     from annelid_studies.tables import records
 
+    if only and paper != "riddle2023":
+        raise typer.BadParameter(f"--only names examinations of riddle2023, and {paper} has none: leave it out")
     if claims is not None:
         if only:
             raise typer.BadParameter("--claims needs the whole report, so leave --only out")
         claims = with_suffix(claims, (".md",), "Markdown", default=".md")
         if not claims.parent.is_dir():
             raise RunFileError(f"{claims} cannot be written: there is no folder {claims.parent}")
+    output = output or Path("report" if paper == "riddle2023" else paper)
+    reproduce = import_module(f"annelid_studies.{paper}.paper").reproduce
+    examinations = {"only": only or None} if paper == "riddle2023" else {}
     with kept_runs(output, jobs=jobs, quiet=quiet) as store:
         effort = "quick" if quick else "full"
-        report = reproduce(output, effort, only=only or None, executor=store.executor, progress=store.progress)
+        report = reproduce(output, effort, executor=store.executor, progress=store.progress, **examinations)
         html = write_report(report, output)
-    written = [html, html.with_suffix(".md")]
+    written = [html, html.with_suffix(".md"), *report.files]
     if claims is not None:
         written.append(write_text(claims, claims_page(report)))
     found = {
@@ -285,8 +299,7 @@ def challenge_command(
         report.write_rows(Pair, compared, output / "pairs.csv"),
         report.ranking_figure(scores, output / "challenge"),
     ]
-    tables = [report.ranking_table(ranked, changes), report.speed_table(ranked)]
-    tables.append(report.pairs_table(compared, tasks.REFERENCE))
+    tables = [report.ranking_table(ranked, changes), *report.speed_tables(ranked), report.pairs_table(compared)]
     if of_own:
         tables.append(report.own_bodies_table([one for one in of_own if one.finer == 1]))
     if any(one.refused for one in every):

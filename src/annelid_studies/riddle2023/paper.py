@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import platform
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
-from importlib.metadata import version
 from pathlib import Path
 
 from annelid.analysis import PAPER_ELONGATION_M, PAPER_END_DIFFERENCE, PAPER_MIDDLE_DEFICIT, middle_deficit
@@ -16,16 +14,31 @@ from annelid.experiment import Case, Outcome, Store, StudyProgress
 from annelid.markdown import Table
 from annelid.nervous import PeristalsisParameters, peristalsis_network
 from annelid.simulation import Run, locks
-from annelid_studies.riddle2023 import words
+from annelid_studies.papers import words
+from annelid_studies.papers.report_parts import Claim, Examined, Figure, Paper, Report, provenance
+from annelid_studies.papers.words import CM, MM, PERCENT, texts
 from annelid_studies.riddle2023.claims import Evidence, claim_cases, paper_claims, rule
 from annelid_studies.riddle2023.claims.evidence import order_of, readings_m
 from annelid_studies.riddle2023.examinations import EXAMINATIONS
 from annelid_studies.riddle2023.examinations.design import walked_elongation
-from annelid_studies.riddle2023.figures import muscle_surface, propagation, renderings, robot_lengths
-from annelid_studies.riddle2023.report_parts import Claim, Examined, Figure, Report
-from annelid_studies.riddle2023.words import CM, MM, PERCENT, caption, texts
+from annelid_studies.riddle2023.figures import (
+    FIGURES_TOML,
+    caption,
+    muscle_surface,
+    propagation,
+    renderings,
+    robot_lengths,
+)
 from annelid_studies.standard_cases import CHAIN, FAST, RODS, RODS_STEP_S, Effort, rods
 
+PAPER = Paper(
+    name="A Dynamic Simulation of a Compliant Worm Robot Amenable to Neural Control",
+    authors="Riddle et al. 2023",
+    title="The paper, reproduced and examined",
+    heading="The paper's claims",
+    command="annelid paper -o report --claims docs/evidence/paper.md",
+    leading=(4, 7, 9),  # The model, what it does, and its elongations beside the robot's
+)
 MAIN = Case(CHAIN)
 VARIANTS = {
     "riddle2023": MAIN,
@@ -89,13 +102,14 @@ def reproduce(
         for i, number in enumerate(FIGURES):
             if progress is not None:
                 progress("drawing", i, len(FIGURES), i / len(FIGURES))
-            stem, title = pictures / f"figure_{number}", texts("figures/figures.toml")[str(number)]["title"]
+            stem, title = pictures / f"figure_{number}", texts(FIGURES_TOML)[str(number)]["title"]
             figures.append(Figure(number, title, stem.with_suffix(".png"), FIGURES[number](main, series, stem)))
         if progress is not None:
             progress("drawing", len(FIGURES), len(FIGURES), 1.0)
         evidence = Evidence(store, effort, {one.examination.name: one.findings for one in examined})
         claims, judging = paper_claims(evidence), rule(evidence)
     return Report(
+        PAPER,
         effort=effort,
         summary=summary,
         main_table=_beside_the_paper(store[MAIN]),
@@ -103,14 +117,7 @@ def reproduce(
         figures=figures,
         claims=claims,
         examinations=examined,
-        provenance={
-            "annelid": version("annelid"),
-            "MuJoCo (mujoco-core)": version("mujoco-core"),
-            "numpy": version("numpy"),
-            "Python": platform.python_version(),
-            "runs": str(len(outcomes)),
-            "processor time of the runs": f"{sum(one.cpu_time_s for one in outcomes.values()) / 60:.0f} min",
-        },
+        provenance=provenance(outcomes.values()),
         rule=judging,
     )
 

@@ -9,17 +9,8 @@ import numpy as np
 from annelid.analysis import ROBOT_ELONGATION_M, forward_position, middle_deficit
 from annelid.morphology import Array
 from annelid.simulation import Run
-from annelid_studies.riddle2023.claims.evidence import (
-    LABELS,
-    NEGLIGIBLE,
-    Evidence,
-    Judgement,
-    judged,
-    judges,
-    longer_worm,
-    longer_worms,
-    near,
-)
+from annelid_studies.papers.judging import Judgement, judged, near
+from annelid_studies.riddle2023.claims.evidence import LABELS, NEGLIGIBLE, Evidence, judges, longer_worm, longer_worms
 from annelid_studies.riddle2023.examinations.friction import PAPERS_FRICTION, SLIPPERY
 from annelid_studies.riddle2023.figures.propagation import measure_propagation
 from annelid_studies.standard_cases import chain, fast, one_after_the_other, rods

@@ -6,12 +6,11 @@ words leave open and judges it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
 from math import nan
-from typing import Any
 
 import numpy as np
 
@@ -19,11 +18,13 @@ from annelid.experiment import Case, Outcome, Store
 from annelid.morphology import Array
 from annelid.simulation import Run
 from annelid_studies import slip
+from annelid_studies.papers.judging import EXACT, NEAR, Judges, claim_of
+from annelid_studies.papers.report_parts import Claim, Findings
+from annelid_studies.papers.words import filled, texts
 from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, SOFT, WORMS, Worm
-from annelid_studies.riddle2023.report_parts import Claim, Findings, Verdict
-from annelid_studies.riddle2023.words import filled, texts
 from annelid_studies.standard_cases import CHAIN, FAST, PLANAR, Effort, chain, fast, one_after_the_other, rods
 
+CLAIMS_TOML = "riddle2023/claims/claims.toml"
 MAIN = Case(CHAIN)
 EQUAL_RANGES = {"body.rings.length_range_m": [0.566, 1.067]}
 SHORT_MINIMUM = {"body.rings.minimum_length": 0.5, **one_after_the_other()}
@@ -59,13 +60,7 @@ LABELS = {worm.name: worm.label for worm in WORMS}
 NEGLIGIBLE = 0.01
 """Travel in a cycle, in lengths of the body, below which we call it negligible."""
 PAPER_STEPS, PAPER_WALL_S = 5000, 210.0
-EXACT, NEAR = 0.005, 0.1
-"""Relative differences from a number of the paper up to which a claim holds, and holds within the margin given."""
 TUBE_AREA_M2, POLYETHYLENE_KG_PER_M3 = 1.7e-5, 940.0
-
-
-Judgement = tuple[tuple[Verdict, str], Mapping[str, Any]]
-"""The verdict with what it holds within or rests on, and what fills the claim's words."""
 
 
 @dataclass(frozen=True)
@@ -92,24 +87,14 @@ class Evidence:
         return [(self.store[case], self.store.run(case)) for case in cases]
 
 
-JUDGES: dict[str, Callable[[Evidence], Judgement]] = {}
-"""What judges a claim, by its name in ``claims.toml``."""
-
-
-def judges(function: Callable[[Evidence], Judgement]) -> Callable[[Evidence], Judgement]:
-    """Marks the function that judges the claim of its name."""
-    JUDGES[function.__name__] = function
-    return function
+JUDGES = Judges[Evidence]()
+judges = JUDGES.judge
 
 
 def judge(name: str, evidence: Evidence) -> Claim:
     """Judges one claim of ``claims.toml``."""
-    text = dict(texts("claims/claims.toml")["claims"][name])
-    decided = text.pop("verdict", None), ""
-    verdict, found = JUDGES[name](evidence) if name in JUDGES else (decided, {})
     commands = {"main": MAIN.command, "planar": PLANAR_CASES[300].command}
-    said = {part: filled(words, {**commands, **found}) for part, words in text.items()}
-    return Claim(**said, verdict=verdict[0], within=verdict[1])
+    return claim_of(texts(CLAIMS_TOML)["claims"][name], JUDGES.get(name), evidence, commands)
 
 
 def spread_cases(effort: Effort) -> list[Case]:
@@ -126,7 +111,7 @@ def rule(evidence: Evidence) -> list[str]:
     preset = perturbed[0].preset
     swings = [readings_m(evidence.store.run(case)) for case in (Case(preset), *perturbed)]
     periods = [evidence.store[case].rhythm.period_s or nan for case in perturbed]
-    text = texts("claims/claims.toml")["rule"]
+    text = texts(CLAIMS_TOML)["rule"]
     found = {
         "which": filled(text[evidence.effort], {}),
         "n": len(perturbed),
@@ -190,24 +175,6 @@ def claim_cases(effort: Effort) -> Sequence[Case]:
 def slip_runs(effort: Effort) -> Sequence[str]:
     """Names of the runs that the slip detector is judged on."""
     return list(slip.CASES) if effort == "full" else slip.QUICK_CASES
-
-
-def near(ours: Iterable[float], paper: float, on: str) -> tuple[Verdict, str]:
-    """Judges all of our readings, of which some may be NaN, by a number of the paper's; see `rule` and `judged`."""
-    apart = [abs(one / paper - 1.0) for one in ours]
-    if all(one <= EXACT for one in apart):
-        return "holds", ""
-    if all(one <= NEAR for one in apart):
-        return "holds within", f"{100 * max(apart):.1f} %"
-    return judged((one <= NEAR for one in apart), on)
-
-
-def judged(has: Iterable[bool], on: str = "") -> tuple[Verdict, str]:
-    """Judges whether runs or readings have a property; see `rule`. Those that do and others differ in what is named."""
-    found = [bool(one) for one in has]
-    if all(found):
-        return "holds", ""
-    return ("rests on", on) if any(found) else ("does not hold", "")
 
 
 def order_of(outcome: Outcome) -> str:

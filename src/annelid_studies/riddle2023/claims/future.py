@@ -5,15 +5,8 @@ from __future__ import annotations
 from math import nan
 
 from annelid_studies import slip as slip_study
-from annelid_studies.riddle2023.claims.evidence import (
-    LABELS,
-    PLANAR_CASES,
-    Evidence,
-    Judgement,
-    judged,
-    judges,
-    slip_runs,
-)
+from annelid_studies.papers.judging import Judgement, judged
+from annelid_studies.riddle2023.claims.evidence import LABELS, PLANAR_CASES, Evidence, judges, slip_runs
 from annelid_studies.riddle2023.examinations.design import WORMS
 from annelid_studies.riddle2023.examinations.friction import PAPERS_FRICTION, frictions_of
 from annelid_studies.slip_detector import detect_slip, score_detections

@@ -10,8 +10,9 @@ from annelid.analysis import CONTRACTED
 from annelid.body import worm_of
 from annelid.config import field_value
 from annelid.simulation import Run
+from annelid_studies.papers.judging import EXACT, Judgement, judged, near
+from annelid_studies.papers.words import span
 from annelid_studies.riddle2023.claims.evidence import (
-    EXACT,
     GATES,
     MAIN,
     PLANAR_CASES,
@@ -20,17 +21,13 @@ from annelid_studies.riddle2023.claims.evidence import (
     TENSION_ONLY,
     TUBE_AREA_M2,
     Evidence,
-    Judgement,
     gated,
-    judged,
     judges,
-    near,
     readings_m,
 )
 from annelid_studies.riddle2023.examinations.design import WORMS
 from annelid_studies.riddle2023.examinations.discretization import HELD, QUANTITIES
 from annelid_studies.riddle2023.figures.muscle_surface import largest_difference
-from annelid_studies.riddle2023.words import span
 from annelid_studies.standard_cases import fast, one_after_the_other, rods
 
 PIN_RADIUS_M = 0.005

@@ -17,19 +17,17 @@ from annelid.analysis import (
 )
 from annelid.experiment import Case
 from annelid.morphology import Array
+from annelid_studies.papers.judging import Judgement, judged, near
+from annelid_studies.papers.words import capitalised, in_unit, span
 from annelid_studies.riddle2023.claims.evidence import (
     JUDGES,
     PAPER_STEPS,
     PAPER_WALL_S,
     Evidence,
-    Judgement,
-    judged,
     judges,
-    near,
     order_of,
     readings_m,
 )
-from annelid_studies.riddle2023.words import capitalised, in_unit, span
 from annelid_studies.standard_cases import FAST
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import nan
 from typing import Any, NamedTuple
@@ -11,10 +11,11 @@ import numpy as np
 
 from annelid.analysis import RhythmScore, middle_deficit
 from annelid.experiment import Case, Hold, Outcome, Store
+from annelid.markdown import Table
 from annelid.morphology import Array
-from annelid_studies.riddle2023.report_parts import Number
-from annelid_studies.riddle2023.words import number
-from annelid_studies.standard_cases import chain, fast, rods
+from annelid_studies.papers.report_parts import Examination, Findings, Number
+from annelid_studies.papers.words import filled, number, texts
+from annelid_studies.standard_cases import Effort, chain, fast, rods
 from annelid_studies.tables import grouped
 
 
@@ -167,3 +168,35 @@ def numbered(readings: Iterable[Reading], readers: Mapping[str, Callable[[Readin
         for one in readings
         for name, reader in readers.items()
     }
+
+
+EXAMINATIONS_TOML = "riddle2023/examinations/examinations.toml"
+
+
+def examination(
+    name: str, cases: Callable[[Effort], Sequence[Case]], examine: Callable[[Store, Effort], Findings]
+) -> Examination:
+    """Makes an examination whose words stand in ``examinations.toml``."""
+    words = texts(EXAMINATIONS_TOML)[name]
+    return Examination(name, filled(words["title"], {}), filled(words["question"], {}), cases, examine)
+
+
+def findings(
+    name: str,
+    values: Mapping[str, Any],
+    table: Table,
+    remarks: Iterable[str] = (),
+    numbers: Mapping[str, Number] | None = None,
+) -> Findings:
+    """Says what an examination found.
+
+    Args:
+        name: Its name in ``examinations.toml``.
+        values: What fills its words.
+        table: Its table.
+        remarks: Names of the remarks that apply.
+        numbers: Single results that claims are judged by.
+    """
+    words = texts(EXAMINATIONS_TOML)[name]
+    said = [filled(words["remarks"][one], values) for one in remarks]
+    return Findings(filled(words["answer"], values), table, said, numbers or {})

@@ -10,10 +10,10 @@ from numpy.typing import ArrayLike
 
 from annelid.experiment import Store
 from annelid.morphology import Array
-from annelid_studies.riddle2023 import words
+from annelid_studies.papers import words
+from annelid_studies.papers.report_parts import Findings, Number
 from annelid_studies.riddle2023.examinations import design
 from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, Columns, Point, Reading, Worm
-from annelid_studies.riddle2023.report_parts import Findings, Number, examination, findings
 from annelid_studies.standard_cases import Effort, one_after_the_other
 from annelid_studies.tables import tabulated
 
@@ -99,7 +99,7 @@ def _examine(store: Store, effort: Effort) -> Findings:
         "force held (N)": lambda one: words.each_in_unit(one.at_holds("force_N")),
     }
     said = {"held": " ".join(map(_convergence_in_words, held))}
-    return findings("discretization", said, tabulated(readings, columns), ["method"], numbers)
+    return design.findings("discretization", said, tabulated(readings, columns), ["method"], numbers)
 
 
 def _in_words(differences: Mapping[str, float]) -> str:
@@ -116,4 +116,4 @@ def _convergence_in_words(found: Convergence) -> str:
     )
 
 
-DISCRETIZATION = examination("discretization", lambda effort: design.cases_of(_points(effort)), _examine)
+DISCRETIZATION = design.examination("discretization", lambda effort: design.cases_of(_points(effort)), _examine)

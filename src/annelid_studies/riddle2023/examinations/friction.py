@@ -7,10 +7,10 @@ from dataclasses import replace
 from typing import Any
 
 from annelid.experiment import Store
-from annelid_studies.riddle2023 import words
+from annelid_studies.papers import words
+from annelid_studies.papers.report_parts import Findings
 from annelid_studies.riddle2023.examinations import design
 from annelid_studies.riddle2023.examinations.design import PAPERS, WORMS, Columns, Point, Worm
-from annelid_studies.riddle2023.report_parts import Findings, examination, findings
 from annelid_studies.standard_cases import Effort, one_after_the_other
 from annelid_studies.tables import tabulated
 
@@ -83,8 +83,10 @@ def _examine(store: Store, effort: Effort) -> Findings:
         "deficit, open loop (%)": lambda one: words.in_percent(one.held_deficit, 1),
         "rhythm": lambda one: words.rhythm(one.rhythm),
     }
-    said = findings("friction", found, tabulated(readings, columns), ["quick"] if effort == "quick" else [], numbers)
+    said = design.findings(
+        "friction", found, tabulated(readings, columns), ["quick"] if effort == "quick" else [], numbers
+    )
     return replace(said, remarks=[*orders, *said.remarks])
 
 
-FRICTION = examination("friction", lambda effort: design.cases_of(_points(effort)), _examine)
+FRICTION = design.examination("friction", lambda effort: design.cases_of(_points(effort)), _examine)

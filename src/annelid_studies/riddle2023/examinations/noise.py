@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 
 from annelid.analysis import RhythmScore
 from annelid.experiment import Case, Store
-from annelid_studies.riddle2023 import words
-from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, SOFT, Worm
-from annelid_studies.riddle2023.report_parts import Findings, Number, examination, findings
-from annelid_studies.riddle2023.words import MM
+from annelid_studies.papers import words
+from annelid_studies.papers.report_parts import Findings, Number
+from annelid_studies.papers.words import MM
+from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, SOFT, Worm, examination, findings
 from annelid_studies.standard_cases import CHAIN, Effort
 from annelid_studies.tables import tabulated
 

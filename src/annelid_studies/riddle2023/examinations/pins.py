@@ -10,11 +10,11 @@ import numpy as np
 from annelid.body import build_spec, worm_of
 from annelid.config import field_value
 from annelid.experiment import Case, Store
-from annelid_studies.riddle2023 import words
+from annelid_studies.papers import words
+from annelid_studies.papers.report_parts import Findings
 from annelid_studies.riddle2023.examinations import design
 from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, SOFT, Columns, Point, Reading
 from annelid_studies.riddle2023.examinations.ranges import compiled_ranges
-from annelid_studies.riddle2023.report_parts import Findings, examination, findings
 from annelid_studies.standard_cases import TIGHT_CHAIN, Effort, chain, fast, one_after_the_other, rods
 from annelid_studies.tables import tabulated
 
@@ -117,7 +117,7 @@ def _examine(store: Store, effort: Effort) -> Findings:
         "closed loop": lambda one: words.rhythm(one.rhythm),
     }
     numbers = {"elongation_tight_first_m": tight_m}
-    return findings("pins", found, tabulated(readings, columns), remarks, numbers)
+    return design.findings("pins", found, tabulated(readings, columns), remarks, numbers)
 
 
 def _rings(reading: Reading) -> np.ndarray:
@@ -134,4 +134,4 @@ def _rounded(stiffness: float) -> str:
     return f"{float(f'{stiffness:.3g}'):,g}"
 
 
-PINS = examination("pins", lambda effort: design.cases_of(_points(effort)), _examine)
+PINS = design.examination("pins", lambda effort: design.cases_of(_points(effort)), _examine)

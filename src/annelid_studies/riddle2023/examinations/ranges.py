@@ -9,10 +9,10 @@ from annelid.analysis import middle_deficit
 from annelid.body import worm_of
 from annelid.experiment import Store
 from annelid.morphology import Array
-from annelid_studies.riddle2023 import words
+from annelid_studies.papers import words
+from annelid_studies.papers.report_parts import Findings
 from annelid_studies.riddle2023.examinations import design
 from annelid_studies.riddle2023.examinations.design import PAPERS, WORMS, Point, Worm
-from annelid_studies.riddle2023.report_parts import Findings, examination, findings
 from annelid_studies.standard_cases import Effort, chain, one_after_the_other
 from annelid_studies.tables import tabulated
 
@@ -101,7 +101,7 @@ def _examine(store: Store, effort: Effort) -> Findings:
     }
     remarks = ["compiled", "closed", *(["quick"] if effort == "quick" else [])]
     numbers = {f"deficit_mean_{one.loop}_{one.ranges}_{one.worm.name}": one.deficit() for one in loops}
-    return findings("ranges", found, tabulated(loops, columns), remarks, numbers)
+    return design.findings("ranges", found, tabulated(loops, columns), remarks, numbers)
 
 
 def _left(rows: Sequence[tuple[_Loop, _Loop]]) -> str:
@@ -112,4 +112,4 @@ def _left(rows: Sequence[tuple[_Loop, _Loop]]) -> str:
     )
 
 
-RANGES = examination("ranges", lambda effort: design.cases_of(_points(effort)), _examine)
+RANGES = design.examination("ranges", lambda effort: design.cases_of(_points(effort)), _examine)

@@ -12,11 +12,11 @@ from annelid.config import RunConfig
 from annelid.experiment import Case, Outcome, Store
 from annelid.morphology import Array
 from annelid.simulation import open_run
-from annelid_studies.riddle2023 import words
+from annelid_studies.papers import words
+from annelid_studies.papers.report_parts import Findings, Number
+from annelid_studies.papers.words import MS
 from annelid_studies.riddle2023.examinations import design
 from annelid_studies.riddle2023.examinations.design import PAPERS, RIGID, SOFT, Columns, Point, Reading, Worm
-from annelid_studies.riddle2023.report_parts import Findings, Number, examination, findings
-from annelid_studies.riddle2023.words import MS
 from annelid_studies.standard_cases import Effort, one_after_the_other
 from annelid_studies.tables import tabulated
 
@@ -120,7 +120,7 @@ def _examine(store: Store, effort: Effort) -> Findings:
         "early": words.listed(early),
         "early_ms": MS * EARLY_S,
     }
-    return findings("timestep", found, tabulated(walks, columns), numbers=numbers)
+    return design.findings("timestep", found, tabulated(walks, columns), numbers=numbers)
 
 
 def _steps(steps_ms: Iterable[float]) -> str:
@@ -147,4 +147,4 @@ def _walks_in_words(own: Sequence[Reading]) -> str:
     )
 
 
-TIMESTEP = examination("timestep", lambda effort: design.cases_of(_points(effort)), _examine)
+TIMESTEP = design.examination("timestep", lambda effort: design.cases_of(_points(effort)), _examine)

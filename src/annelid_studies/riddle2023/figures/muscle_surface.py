@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from annelid.body import Rings, muscle_force
 from annelid.draw import canvas, panel_title, save_both, segment_colors
 from annelid.morphology import Array
-from annelid_studies.riddle2023.words import caption
+from annelid_studies.riddle2023.figures import caption
 
 SCALED_RANGE = (0.75, 1.05)
 """Scaled lengths between which a ring's operating range lies: MuJoCo's default."""

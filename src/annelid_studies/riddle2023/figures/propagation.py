@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from annelid.draw import POINTS_PER_SIDE, WIDTH_IN, canvas, panel_title, picture_axes, save_both
 from annelid.morphology import Array, MeshGeometry
 from annelid.simulation import Run
+from annelid_studies.riddle2023.figures import caption
 from annelid_studies.riddle2023.figures.renderings import (
     Place,
     Posture,
@@ -28,7 +29,6 @@ from annelid_studies.riddle2023.figures.rhombi import (
     rhombus_diagonals,
     rhombus_plane,
 )
-from annelid_studies.riddle2023.words import caption
 
 TIME_S = 1.5
 """The moment of the paper's figure 8, in the middle of the first contraction of segment 2."""

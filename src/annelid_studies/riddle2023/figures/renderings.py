@@ -36,7 +36,7 @@ from annelid.draw import (
 )
 from annelid.morphology import Array, MeshGeometry
 from annelid.simulation import Run, compile_worm
-from annelid_studies.riddle2023.words import caption
+from annelid_studies.riddle2023.figures import caption
 
 Place = Callable[[ArrayLike], Array]
 """From points in space, m, shape ``(..., 3)``, to the axes' coordinates, m, shape ``(..., 2)``."""

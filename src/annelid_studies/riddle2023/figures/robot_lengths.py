@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from annelid.analysis import PAPER_ELONGATION_M, ROBOT_ELONGATION_M
 from annelid.draw import canvas, panel_title, save_both, segment_colors
-from annelid_studies.riddle2023.words import caption
+from annelid_studies.riddle2023.figures import caption
 
 _CM = 100.0
 _BAR = 0.8

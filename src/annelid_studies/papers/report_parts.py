@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import platform
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Literal, get_args
 
 from annelid.errors import suggest
-from annelid.experiment import Case, Store
+from annelid.experiment import Case, Outcome, Store
 from annelid.markdown import Table
-from annelid_studies.riddle2023.words import filled, texts
 from annelid_studies.standard_cases import Effort
 
 Verdict = Literal["holds", "holds within", "rests on", "does not hold", "not testable here"]
@@ -31,6 +32,18 @@ class Claim:
     command: str
     verdict: Verdict  # Whether it holds
     within: str = ""  # How nearly, for example "4.5 %", where it holds within something; what it rests on
+
+
+def provenance(outcomes: Collection[Outcome]) -> dict[str, str]:
+    """Returns what a report says of its making: versions, number of runs, and their processor time."""
+    return {
+        "annelid": version("annelid"),
+        "MuJoCo (mujoco-core)": version("mujoco-core"),
+        "numpy": version("numpy"),
+        "Python": platform.python_version(),
+        "runs": str(len(outcomes)),
+        "processor time of the runs": f"{sum(one.cpu_time_s for one in outcomes) / 60:.0f} min",
+    }
 
 
 def tally(claims: Sequence[Claim]) -> str:
@@ -80,38 +93,6 @@ class Examination:
     examine: Callable[[Store, Effort], Findings]  # Returns what it found in a store of its runs
 
 
-EXAMINATIONS_TOML = "examinations/examinations.toml"
-
-
-def examination(
-    name: str, cases: Callable[[Effort], Sequence[Case]], examine: Callable[[Store, Effort], Findings]
-) -> Examination:
-    """Makes an examination whose words stand in ``examinations.toml``."""
-    words = texts(EXAMINATIONS_TOML)[name]
-    return Examination(name, filled(words["title"], {}), filled(words["question"], {}), cases, examine)
-
-
-def findings(
-    name: str,
-    values: Mapping[str, Any],
-    table: Table,
-    remarks: Iterable[str] = (),
-    numbers: Mapping[str, Number] | None = None,
-) -> Findings:
-    """Says what an examination found.
-
-    Args:
-        name: Its name in ``examinations.toml``.
-        values: What fills its words.
-        table: Its table.
-        remarks: Names of the remarks that apply.
-        numbers: Single results that claims are judged by.
-    """
-    words = texts(EXAMINATIONS_TOML)[name]
-    said = [filled(words["remarks"][one], values) for one in remarks]
-    return Findings(filled(words["answer"], values), table, said, numbers or {})
-
-
 @dataclass(frozen=True)
 class Examined:
     """An examination with what it found."""
@@ -121,9 +102,22 @@ class Examined:
 
 
 @dataclass(frozen=True)
+class Paper:
+    """The paper that a report is about."""
+
+    name: str  # Its title
+    authors: str  # And the year
+    title: str  # Title of the report
+    heading: str  # Title of the repository's page of claims
+    command: str  # The command that writes that page
+    leading: Sequence[int]  # Numbers of the figures that stand first in the report
+
+
+@dataclass(frozen=True)
 class Report:
     """The whole report."""
 
+    paper: Paper  # What it is about
     effort: Effort  # Quick or full
     summary: Sequence[str]  # Paragraphs that say how to read the numbers
     main_table: Table  # Our main numbers beside the paper's, with the deviation
@@ -133,3 +127,4 @@ class Report:
     examinations: Sequence[Examined]  # The examinations in the order of the report
     provenance: Mapping[str, str]  # Versions, number of runs, processor time: label and value
     rule: Sequence[str] = ()  # Paragraphs that say how the claims are judged
+    files: Sequence[Path] = ()  # Further files that were written

@@ -10,17 +10,11 @@ from urllib.parse import quote
 from annelid.draw import html_page
 from annelid.markdown import anchors, code, emphasis, plain_table, strong, table, words
 from annelid.output import write_text
-from annelid_studies.riddle2023.report_parts import Claim, Examined, Figure, Report, tally
-from annelid_studies.riddle2023.words import capitalised
+from annelid_studies.papers.report_parts import Claim, Examined, Figure, Report, tally
+from annelid_studies.papers.words import capitalised
 from annelid_studies.tables import grouped
 
-TITLE = "The paper, reproduced and examined"
-PAPER = "A Dynamic Simulation of a Compliant Worm Robot Amenable to Neural Control"
 MARKDOWN_NAME, HTML_NAME = "report.md", "report.html"
-LEADING = (4, 7, 9)
-"""Numbers of the figures that stand first: the model, what it does, and its elongations beside the robot's."""
-CLAIMS_COMMAND = "annelid paper -o report --claims docs/evidence/paper.md"
-"""The command that regenerates the page of claims in the repository."""
 
 
 def write_report(report: Report, folder: Path) -> Path:
@@ -38,10 +32,11 @@ def write_report(report: Report, folder: Path) -> Path:
         OSError: The folder cannot be made, or a picture cannot be read.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    intro = f"What {emphasis(PAPER)} (Riddle et al. 2023) shows and claims, beside what annelid computes."
-    head = f"# {TITLE}\n\n{intro}\n\n{_provenance(report)}"
-    leading = [figure for figure in report.figures if figure.number in LEADING]
-    others = [figure for figure in report.figures if figure.number not in LEADING]
+    paper = report.paper
+    intro = f"What {emphasis(paper.name)} ({paper.authors}) shows and claims, beside what annelid computes."
+    head = f"# {paper.title}\n\n{intro}\n\n{_provenance(report)}"
+    leading = [figure for figure in report.figures if figure.number in paper.leading]
+    others = [figure for figure in report.figures if figure.number not in paper.leading]
     blocks = [
         *_main_numbers(report),
         *(block for figure in leading for block in _figure(figure, folder)),
@@ -52,22 +47,21 @@ def write_report(report: Report, folder: Path) -> Path:
     ]
     contents, content = _contents(blocks), "\n\n".join(blocks)
     write_text(folder / MARKDOWN_NAME, f"{head}\n\n## Contents\n\n{contents}\n\n{content}\n")
-    return write_text(folder / HTML_NAME, html_page(TITLE, head, contents, content, folder))
+    return write_text(folder / HTML_NAME, html_page(paper.title, head, contents, content, folder))
 
 
 def claims_page(report: Report) -> str:
     """Returns the Markdown of the repository's page of claims, of a whole report."""
+    paper = report.paper
     intro = (
-        f"What the paper, {emphasis(PAPER)} (Riddle et al. 2023), shows and claims, beside what annelid measures. "
-        f"Every number of ours comes from a run; this page is written by {code(CLAIMS_COMMAND)}, together with the "
-        f"whole report: its figures and its examinations."
+        f"What the paper, {emphasis(paper.name)} ({paper.authors}), shows and claims, beside what annelid measures. "
+        f"Every number of ours comes from a run; this page is written by {code(paper.command)}, together with the "
+        f"whole report{': its figures and its examinations' if report.examinations else ''}."
     )
     found = [f"- {strong(f'{one.examination.title}.')} {words(one.findings.answer)}" for one in report.examinations]
     answers = ["## What the examinations found", "\n".join(found)] if found else []
     numbers = [*_main_numbers(report), *_details_of_numbers(report)]
-    return (
-        "\n\n".join(["# The paper's claims", intro, _provenance(report), *numbers, *_claims(report), *answers]) + "\n"
-    )
+    return "\n\n".join([f"# {paper.heading}", intro, _provenance(report), *numbers, *_claims(report), *answers]) + "\n"
 
 
 def _contents(blocks: Iterable[str]) -> str:
@@ -79,7 +73,7 @@ def _contents(blocks: Iterable[str]) -> str:
 
 
 def _provenance(report: Report) -> str:
-    effort = "Quick report, with coarser maps than the full one" if report.effort == "quick" else "Full report"
+    effort = "Quick report, from fewer runs than the full one" if report.effort == "quick" else "Full report"
     return " · ".join([effort, *(f"{words(label)} {words(value)}" for label, value in report.provenance.items())])
 
 

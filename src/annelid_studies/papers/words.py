@@ -109,8 +109,8 @@ def kind(score: RhythmScore) -> str:
 
 @cache
 def texts(name: str) -> Mapping[str, Any]:
-    """Reads one of the files of words beside this module, by its path."""
-    return parse_toml((files("annelid_studies.riddle2023") / name).read_text(encoding="utf-8"), name)
+    """Reads a file of words, by its path in this package."""
+    return parse_toml((files("annelid_studies") / name).read_text(encoding="utf-8"), name)
 
 
 _UNITS = {"n": 1.0, "cm": CM, "mm": MM, "%": PERCENT}
@@ -134,8 +134,3 @@ def filled(text: str, values: Mapping[str, Any]) -> str:
     ``%`` with none; ``cm.1`` has one. Several numbers become their range, and a missing one a dash.
     """
     return _Words().vformat(" ".join(text.split()), (), values)
-
-
-def caption(number: int, values: Mapping[str, Any] | None = None) -> str:
-    """Returns the caption of a figure, by the paper's number."""
-    return filled(texts("figures/figures.toml")[str(number)]["caption"], values or {})

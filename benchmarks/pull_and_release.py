@@ -280,6 +280,32 @@ def chain(scene: Scene, *, published: bool) -> tuple[Step, float]:
     return step, step_s
 
 
+def cosserat_rod(place_m: Array, heavier: float) -> Any:
+    """Returns a rod of PyElastica, with a multiple of its rotary inertia, at rest through ``(n_vertices, 3)``, m."""
+    ea: Any = import_module("elastica")
+    edges = np.diff(place_m, axis=0)
+    tangents = edges / np.linalg.norm(edges, axis=1, keepdims=True)
+    across = np.cross(tangents, [1.0, 0.0, 0.0])
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    rod = ea.CosseratRod.straight_rod(
+        len(edges),
+        place_m[0],
+        tangents[0],
+        across[0],
+        float(np.linalg.norm(edges, axis=1).sum()),
+        MATERIAL.radius_m,
+        DENSITY,
+        youngs_modulus=YOUNG_PA,
+        shear_modulus=SHEAR_PA,
+        position=place_m.T,
+        directors=np.stack([across, np.cross(tangents, across), tangents]).transpose(0, 2, 1),
+    )
+    rod.mass_second_moment_of_inertia *= heavier
+    rod.inv_mass_second_moment_of_inertia /= heavier
+    rod.rest_kappa[:] = rod.kappa
+    return rod
+
+
 def pyelastica(scene: Scene) -> tuple[Step, float]:
     """Cosserat rods with an enlarged rotary inertia, at the longest stable step."""
     ea: Any = import_module("elastica")
@@ -307,26 +333,7 @@ def pyelastica(scene: Scene) -> tuple[Step, float]:
 
     system, rods, now_N = System(), [], np.zeros((len(scene.pulled), 3))
     for s, place in enumerate(scene.vertices_m):
-        edges = np.diff(place, axis=0)
-        tangents = edges / np.linalg.norm(edges, axis=1, keepdims=True)
-        across = np.cross(tangents, [1.0, 0.0, 0.0])
-        across /= np.linalg.norm(across, axis=1, keepdims=True)
-        rod = ea.CosseratRod.straight_rod(
-            len(edges),
-            place[0],
-            tangents[0],
-            across[0],
-            float(np.linalg.norm(edges, axis=1).sum()),
-            MATERIAL.radius_m,
-            DENSITY,
-            youngs_modulus=YOUNG_PA,
-            shear_modulus=SHEAR_PA,
-            position=place.T,
-            directors=np.stack([across, np.cross(tangents, across), tangents]).transpose(0, 2, 1),
-        )
-        rod.mass_second_moment_of_inertia *= heavier
-        rod.inv_mass_second_moment_of_inertia /= heavier
-        rod.rest_kappa[:] = rod.kappa
+        rod = cosserat_rod(place, heavier)
         system.append(rod)
         rods.append(rod)
         if scene.clamped:
@@ -349,6 +356,38 @@ def pyelastica(scene: Scene) -> tuple[Step, float]:
     return step, step_s
 
 
+def discrete_rods(
+    builder: Any,
+    add_rod: Any,
+    vertices_m: Array,
+    crossings: list[tuple[Place, Place]],
+    damping_s: float,
+    **options: Any,
+) -> list[list[int]]:
+    """Adds strands that share nodes at crossings to a model of dismech-newton; returns what `add_rod` returned."""
+    newton: Any = import_module("newton")
+    n_vertices, added = vertices_m.shape[1], []
+    for place in vertices_m:
+        element_m = float(np.linalg.norm(place[1] - place[0]))
+        rod = newton.Rod(points=place, radius=MATERIAL.radius_m, youngs_modulus=YOUNG_PA, shear_modulus=SHEAR_PA)
+        damping = {
+            "bend_damping": damping_s * MATERIAL.bending_rigidity_Nm2 / element_m,
+            "twist_damping": damping_s * TORSION / element_m,
+        }
+        cfg = newton.ModelBuilder.ShapeConfig(density=DENSITY, collision_group=-1)
+        added.append(add_rod(builder, rod, cfg=cfg, **damping, **options))
+    for (a, v), (b, w) in crossings:
+        kept, replaced = a * n_vertices + v, b * n_vertices + w
+        builder.particle_mass[kept] += builder.particle_mass[replaced]
+        builder.particle_flags[replaced] &= ~newton.ParticleFlags.ACTIVE
+        for name in ("dismech:edge_node0", "dismech:edge_node1"):
+            nodes = builder.custom_attributes[name].values
+            for edge, node in enumerate(nodes):
+                if node == replaced:
+                    nodes[edge] = kept
+    return added
+
+
 def dismech(scene: Scene) -> tuple[Step, float]:
     """Implicit discrete elastic rods."""
     newton: Any = import_module("newton")
@@ -356,26 +395,9 @@ def dismech(scene: Scene) -> tuple[Step, float]:
     step_s, n_vertices = dividing(DISMECH_S * scene.coarseness), scene.vertices_m.shape[1]
     builder = newton.ModelBuilder(gravity=(0.0, 0.0, 0.0))
     peer.register_custom_attributes(builder)
-    for place in scene.vertices_m:
-        rod = newton.Rod(points=place, radius=MATERIAL.radius_m, youngs_modulus=YOUNG_PA, shear_modulus=SHEAR_PA)
-        edges = peer.add_rod(
-            builder,
-            rod,
-            cfg=newton.ModelBuilder.ShapeConfig(density=DENSITY),
-            bend_damping=scene.damping_s * MATERIAL.bending_rigidity_Nm2 / scene.element_m,
-            twist_damping=scene.damping_s * TORSION / scene.element_m,
-            proxies=False,
-        )
-        if scene.clamped:
-            peer.fix_segment(builder, edge=edges[0])
-    for (a, v), (b, w) in scene.crossings:
-        kept, replaced = a * n_vertices + v, b * n_vertices + w
-        builder.particle_mass[kept] += builder.particle_mass[replaced]
-        for name in ("dismech:edge_node0", "dismech:edge_node1"):
-            nodes = builder.custom_attributes[name].values
-            for edge, node in enumerate(nodes):
-                if node == replaced:
-                    nodes[edge] = kept
+    strands = discrete_rods(builder, peer.add_rod, scene.vertices_m, scene.crossings, scene.damping_s, proxies=False)
+    for edges in strands if scene.clamped else []:
+        peer.fix_segment(builder, edge=edges[0])
     model = builder.finalize(device="cpu")
     solver = peer.DiSMechSolver(model, theta=DISMECH_THETA)
     states = [model.state(), model.state()]

@@ -1,9 +1,9 @@
 """Trains the network of controller kind `policy` by reinforcement learning: soft actor-critic of Stable-Baselines3.
 
-An episode is one training draw of one of the tasks `TASKS`, in the Gymnasium environment of a coarser body than the
-benchmark's, which judges what was learned. The reward is the way that the worm comes. From random weights, no gait was
-found in 2,000 steps, so the actor first imitates waves by the clock. Training goes piece by piece: each has its own
-random numbers and ends in a checkpoint, so an interrupted training ends with the same bits as another.
+An episode is one training draw of one of the tasks `TASKS`, in the Gymnasium environment of the body with longer steps
+than the benchmark's, which judges what was learned. The reward is the way that the worm comes. From random weights, no
+gait was found in 2,000 steps, so the actor first imitates waves by the clock. Training goes piece by piece: each has
+its own random numbers and ends in a checkpoint, so an interrupted training ends with the same bits as another.
 """
 
 from __future__ import annotations
@@ -47,11 +47,11 @@ SEED = 0
 EVALUATED = 0
 """Training seed of the draws on which every piece's network is judged."""
 INTERVAL_S = {"three": 0.08, "six": 0.12}
-COARSER: Mapping[str, tuple[str, str | None]] = {
+TRAINED_ON: Mapping[str, tuple[str, str | None]] = {
     "three": ("riddle2023-rods", None),
     "six": ("riddle2025", "coarse"),
 }
-"""Preset and level of the body that is trained on in place of each of the benchmark's."""
+"""Preset and level that stand for each of the bodies of the benchmark in training."""
 EPISODE_STEPS = 80
 PIECE = 2000
 """Environment steps of a piece."""
@@ -113,7 +113,7 @@ class PolicyEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def __init__(self, body: str) -> None:
         """Takes the name of the body."""
-        (self._preset, self._fidelity), self._interval_s = COARSER[body], INTERVAL_S[body]
+        (self._preset, self._fidelity), self._interval_s = TRAINED_ON[body], INTERVAL_S[body]
         self.speeds_m_per_s: list[float] = []
         self.begin(TASKS[0], EVALUATED)
         n = self.n_segments = self._env.worm.n_segments

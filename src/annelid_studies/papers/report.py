@@ -53,9 +53,10 @@ def write_report(report: Report, folder: Path) -> Path:
 def claims_page(report: Report) -> str:
     """Returns the Markdown of the repository's page of claims, of a whole report."""
     paper = report.paper
+    command = paper.command + (" --quick" if report.effort == "quick" else "")
     intro = (
         f"What the paper, {emphasis(paper.name)} ({paper.authors}), shows and claims, beside what annelid measures. "
-        f"Every number of ours comes from a run; this page is written by {code(paper.command)}, together with the "
+        f"Every number of ours comes from a run; this page is written by {code(command)}, together with the "
         f"whole report{': its figures and its examinations' if report.examinations else ''}."
     )
     found = [f"- {strong(f'{one.examination.title}.')} {words(one.findings.answer)}" for one in report.examinations]

@@ -13,7 +13,7 @@ The programs are annelid's rods (also with the engine's own settings of
 friction and contact) and chain, the rods of dismech-newton with contact (implicit, by ADMM), and PyElastica
 (explicit, crossings as springs). The time is that of one core after the first sample, in which programs compile.
 
-It needs the environment of ``pull_and_release.py`` and takes ten minutes:
+It needs the environment of ``pull_and_release.py`` and takes five minutes:
 
     python benchmarks/walk.py --csv docs/results/walk_elsewhere.csv
 """

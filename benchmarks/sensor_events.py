@@ -28,7 +28,7 @@ from annelid.analysis.rhythm import DESIGN_INTERVAL_S
 from annelid.body import worm_of
 from annelid.experiment.case import SHEAR_OVER_YOUNG
 from annelid.output import write_csv
-from annelid_studies.robustness import TIMED
+from annelid_studies.robustness import WAVE
 from annelid_studies.standard_cases import PAPERS_RODS
 
 
@@ -107,7 +107,7 @@ def print_windows(path: Path | None, step_s: float) -> None:
             "body.mesh.elements_per_side": 2,
             "clock.physics_timestep_s": step_s,
             "record.signals_interval_s": 0.01,
-            "controller": TIMED,
+            "controller": WAVE,
             "duration_s": 6.6,
             "arena.friction": friction,
             "body.strands.damping_time_s": damping,

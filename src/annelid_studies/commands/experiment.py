@@ -91,6 +91,7 @@ STUDIES = (
     Study("slip-detector", "slip", "detection", output="slip"),
     Study("turning", "turning"),
     Study("pipes", "pipes"),
+    Study("robustness", "robustness"),
     Study("weak-middle", "weak_middle.results"),
 )
 for _study in STUDIES:

@@ -1,4 +1,4 @@
-"""The studies that have commands of many options: `paper`, `bench`, `robustness` and `challenge`."""
+"""The studies that have commands of many options: `paper`, `bench` and `challenge`."""
 
 from __future__ import annotations
 
@@ -23,7 +23,6 @@ from annelid.cli import (
     lock,
     print_results,
     study,
-    wants_json,
 )
 from annelid.errors import RunFileError
 
@@ -140,52 +139,6 @@ def bench_command(
     tables = [] if quiet else [bench_table(report)]
     print_results((path, bench_figure(report, output / "bench")), *tables, quiet=quiet)
     end_study(len(report["cases"]), sum("failed" in case for case in report["cases"]), path)
-
-
-@study("robustness")
-def robustness_command(
-    output: ResultsFolder = Path("robustness"),
-    points: Annotated[int, typer.Option(min=1, max=1_000_000, help="Number of points of the sample.")] = 300,
-    segments: Annotated[
-        int | None,
-        typer.Option(min=3, max=200, help="Number of segments of every worm  [default: drawn, 3 to 24]"),
-    ] = None,
-    controller: Annotated[
-        list[str] | None, typer.Option(metavar="KIND", help="Only this one; may be repeated.  [default: all four]")
-    ] = None,
-    jobs: Jobs = None,
-    quiet: OnlyPaths = False,
-) -> None:
-    """Compare how often controllers make different worms walk.
-
-    The sample varies sensor noise, friction, physics step, number of segments and stiffness. Every worm is driven by
-    four controllers. sns is the paper's, with the preset's tolerance. sns-tolerance is the same with the tolerance that
-    its body needs. sns-robust is this project's own. timed is a wave without sensing.
-
-    Writes robustness.json and robustness.md for all runs in the folder. A second call continues where the first was
-    stopped, and one with more points computes only the new ones. All 300 points take about 25 hours of one core for
-    each controller.
-
-    \b
-    annelid study robustness --points 10 -o draft     the first ten points
-    annelid study robustness --segments 3             short worms only
-    annelid study robustness --controller sns-robust  one controller only
-    annelid study robustness --points 300             all
-    """
-    from annelid_studies.robustness import CONTROLLERS, robustness, shares, shares_table
-
-    with kept_runs(output, jobs=jobs, quiet=quiet) as store:
-        judged = robustness(
-            output,
-            points,
-            controllers=tuple(controller or CONTROLLERS),
-            n_segments=segments,
-            executor=store.executor,
-            progress=store.progress,
-        )
-    if not (quiet or wants_json()):
-        typer.echo(shares_table(shares(judged)))
-    print_results((output / "robustness.json", output / "robustness.md"), quiet=quiet)
 
 
 @study("challenge")

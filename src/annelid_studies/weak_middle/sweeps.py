@@ -72,7 +72,7 @@ def weight_changes(mass_kg: float) -> dict[str, Any]:
 SEGMENTS = Quantity(
     "segments",
     "number of segments",
-    (3, 4, 5, 6, 7, 8),
+    (3, 4, 6, 8),
     lambda n_segments: {"body.mesh.n_segments": int(n_segments)},
     (3, 4),
     "Length of the worm",
@@ -80,20 +80,20 @@ SEGMENTS = Quantity(
 STIFFNESS = Quantity(
     "stiffness",
     "Young's modulus (GPa)",
-    (0.3, 0.5, 0.8, 1.2, 2.0),
+    (0.3, 0.8, 2.0),
     stiffness_changes,
-    (0.5, 2.0),
+    (0.8, 2.0),
     "Stiffness of the rods",
 )
 WEIGHT = Quantity(
-    "weight", "mass of the worm (kg)", (0.0, 0.77, 1.3, 1.87, 2.4, 3.0), weight_changes, (0.0, 1.87), "Weight"
+    "weight", "mass of the worm (kg)", (0.0, 0.77, 1.87, 3.0), weight_changes, (0.0, 1.87), "Weight"
 )
 FRICTION = Quantity(
     "friction",
     "friction of the ground",
-    (0.05, 0.1, 0.2, 0.4, 0.7, 1.0, 1.5),
+    (0.05, 0.2, 0.7, 1.0),
     lambda friction: {"arena.friction": friction},
-    (0.1, 0.7),
+    (0.2, 0.7),
     "Friction",
 )
 QUANTITIES = (SEGMENTS, STIFFNESS, WEIGHT, FRICTION)
@@ -239,7 +239,11 @@ SPRINGS = Quantity(
     (14.0, 17.0, 20.0, 24.5, 29.0, 32.0),
     lambda rate: {"body.springs.stiffness_N_per_m": rate},
 )
-CAUSES = (SPRINGS, WEIGHT._replace(values=(0.6, *WEIGHT.values[1:])), FRICTION._replace(values=(*FRICTION.values, 2.0)))
+CAUSES = (
+    SPRINGS,
+    WEIGHT._replace(values=(0.6, 0.77, 1.3, 1.87, 2.4, 3.0)),
+    FRICTION._replace(values=(0.1, 0.2, 0.4, 0.7, 1.0, 1.5, 2.0)),
+)
 """Quantities of the whole worm: what they do is a bound to what the same difference in one segment could do."""
 END_FORCES_N = (12.8, 13.1, 13.4)
 

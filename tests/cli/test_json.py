@@ -16,6 +16,7 @@ from typer.main import get_command
 
 from annelid.cli import app, entry
 from annelid.output import write_csv
+from annelid_studies.commands.experiment import STUDIES, Study
 from outcome import STUDY, Command, Outcome
 
 pytestmark = pytest.mark.usefixtures("runs_in_this_process", "undrawn")
@@ -44,6 +45,7 @@ def picture(*_: object, **__: object) -> Path:
 def fake(monkeypatch: pytest.MonkeyPatch, module: str, **found: object) -> None:
     """Puts these results in the place of what a study computes; its tables are `ROWS`, its pictures are not drawn."""
     study = import_module(module)
+    assert found.keys() <= vars(study).keys(), "what is replaced is there"
     for name, function in vars(study).items():
         if not isfunction(function):
             continue
@@ -57,31 +59,29 @@ def fake(monkeypatch: pytest.MonkeyPatch, module: str, **found: object) -> None:
             monkeypatch.setattr(study, name, lambda *_: None)
 
 
-Fakes = dict[str, dict[str, object]]
-STUDIES: dict[str, Fakes] = {
-    "study challenge": {
-        "annelid_studies.challenge.scores": {"challenge": []},
-        "annelid_studies.challenge.ranking": {"standings": [], "pairs": []},
-        "annelid_studies.challenge.report": {},
-    },
-    "study speed": {"annelid_studies.crawling": {"crawl": []}},
-    "study gaits": {"annelid_studies.crawling": {"headlines": [None]}},
-    "study slip": {"annelid_studies.slip": {"slip_feedback": []}},
-    "study slip-detector": {"annelid_studies.slip": {"slip_detection": {}, "scores": {}}},
-    "study turning": {"annelid_studies.turning": {"turning": ([], [])}},
-    "study pipes": {"annelid_studies.pipes": {"pass_pipes": ([], [])}},
-    "study weak-middle": {"annelid_studies.weak_middle.results": {"weak_middle": ({}, [])}},
+def challenge(annelid: Command, _: Path, monkeypatch: pytest.MonkeyPatch) -> Outcome:
+    for module, found in {"scores": {"challenge": []}, "ranking": {"standings": [], "pairs": []}, "report": {}}.items():
+        fake(monkeypatch, f"annelid_studies.challenge.{module}", **found)
+    return annelid("study", "challenge", "--quick", "--json")
+
+
+def studied(of: Study) -> Callable[[Command, Path, pytest.MonkeyPatch], Outcome]:
+    """Runs a study with `ROWS` in the place of what it computes."""
+
+    def written(_: object, output: Path, *__: object, **___: object) -> tuple[list[Path], list[object]]:
+        return [write_rows(output / "rows.csv")], []
+
+    def run(annelid: Command, _: Path, monkeypatch: pytest.MonkeyPatch) -> Outcome:
+        monkeypatch.setattr(f"annelid_studies.{of.module}.{of.function}", written)
+        return annelid("study", of.name, "--quick", "--json")
+
+    return run
+
+
+STUDIED: dict[str, Callable[[Command, Path, pytest.MonkeyPatch], Outcome]] = {
+    "study challenge": challenge,
+    **{f"study {one.name}": studied(one) for one in STUDIES},
 }
-"""Commands whose runs take minutes or more, with what stands in their place."""
-
-
-def robustness(annelid: Command, finished: Path, monkeypatch: pytest.MonkeyPatch) -> Outcome:
-    def walked(folder: Path, *_: object, **__: object) -> list[object]:
-        (folder / "robustness.json").write_text('{"shares": {}, "judged": [{"score": NaN}]}')
-        return []
-
-    monkeypatch.setattr("annelid_studies.robustness.robustness", walked)
-    return annelid("study", "robustness", "--json")
 
 
 def calibrate(annelid: Command, finished: Path, monkeypatch: pytest.MonkeyPatch) -> Outcome:
@@ -109,17 +109,6 @@ def typed(*words: str) -> Callable[[Command, Path, pytest.MonkeyPatch], Outcome]
     return lambda annelid, finished, _: annelid(*(finished if word == "RUN" else word for word in words), "--json")
 
 
-def faked(name: str) -> Callable[[Command, Path, pytest.MonkeyPatch], Outcome]:
-    """Runs a study whose computing is replaced."""
-
-    def run(annelid: Command, _: Path, monkeypatch: pytest.MonkeyPatch) -> Outcome:
-        for module, found in STUDIES[name].items():
-            fake(monkeypatch, module, **found)
-        return annelid(*name.split(), "--quick", "--json")
-
-    return run
-
-
 def loop(annelid: Command, _: Path, monkeypatch: pytest.MonkeyPatch) -> Outcome:
     # Busy tests beside it must not end it.
     quick = ("--duration", "0.2", "--rate", "20", "--watchdog", "40")
@@ -143,11 +132,10 @@ DONE = {
     "list numbers": typed("list", "numbers"),
     "doctor": typed("doctor"),
     "study load-frame": typed("study", "load-frame", "--displacement", "90"),
-    "study robustness": robustness,
     "calibrate": calibrate,
     "sweep": sweep,
     "tune": tune,
-} | {name: faked(name) for name in STUDIES}
+} | STUDIED
 LISTS = {"check", "list runs", "list presets", "list arenas", "list numbers", "doctor"}
 """What prints a list; all others print an object."""
 
@@ -181,7 +169,7 @@ def test_a_command_prints_its_result_as_json_and_nothing_else(
     assert done.exit_code == (entry.EXIT_ALL_FAILED if name == "tune" else 0), done.err
     document = strict(done.out)
     assert isinstance(document, list) == (name in LISTS)
-    if name in STUDIES:
+    if name in STUDIED:
         assert all(rows == [{**ROWS[0], "drift": None}] for rows in document["results"].values())
     if name not in {*LISTS, "show", "study limit-cycle"}:
         assert document["files"]

@@ -69,7 +69,7 @@ LONG = {
     ("annelid", "paper"): ("an hour, or 6 minutes with --quick", ("--quick",)),
     ("annelid", "study", "bench"): ("up to half an hour", ("--quick",)),
     ("annelid", "study", "challenge"): ("hours, or minutes with --quick", ("--quick",)),
-    ("annelid", "study", "robustness"): ("hours for 300 points", ("--points", "1")),
+    ("annelid", "study", "robustness"): ("an hour", ("--quick",)),
     ("annelid", "tune"): ("an hour", ("--trials", "2", "--duration", "1")),
     ("annelid", "calibrate", "mine/study.toml"): ("some minutes", ("--free", "young_modulus")),
     ("annelid", "calibrate", "twin/study.toml"): ("some minutes", ("--free", "young_modulus")),

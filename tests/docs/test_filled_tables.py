@@ -66,7 +66,6 @@ NO_WORM = {
 """Result files that are not of presets, and why."""
 
 STALE: tuple[str, ...] = (
-    "robustness_three_segments.json",
     "weak_middle.csv",
 )
 """Result files whose worms have changed since: to be measured again."""

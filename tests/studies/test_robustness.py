@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,48 +9,50 @@ import numpy as np
 import pytest
 
 from annelid.analysis.rhythm import RhythmScore
-from annelid.errors import ConfigError
+from annelid.experiment import Store
 from annelid_studies import robustness as study
-from annelid_studies.robustness import CONTROLLERS, Judged, judge, points, shares
+from annelid_studies.robustness import CONTROLLERS, Judged, judge, sample, shares, tolerance_m
 from rods import tolerance_window_m
 
 pytestmark = pytest.mark.usefixtures("runs_in_this_process")
 
 WAVE = RhythmScore("ordered", "a wave", (1, 2, 3), 2.625, 0.0, 1.0, 1, 1, 1.0, 5.0)
+WORM = sample(8)[3]
+STEP_S = 0.01
 
 
-def test_the_sample_is_a_latin_hypercube() -> None:
-    """Spread quantities have one point a stratum; rounded ones as many points a value as its share of the range."""
-    sample = points()
-    n = len(sample)
-    assert n == 300
-    shares_of = {
-        "noise_m": [p.noise_m / 0.005 for p in sample],
-        "friction": [np.log(p.friction / 0.05) / np.log(30.0) for p in sample],
-        "young_modulus_Pa": [np.log(p.young_modulus_Pa / 0.3e9) / np.log(2.0 / 0.3) for p in sample],
-    }
-    for values in shares_of.values():
-        # Values are rounded when written, by less than a tenth of a stratum.
-        assert np.abs(np.sort(values) - (np.arange(n) + 0.5) / n).max() <= 0.6 / n
-    segments = np.array([p.n_segments for p in sample])
-    assert set(segments) == set(range(3, 25))
-    assert np.abs(np.bincount(segments)[3:] - n / 22).max() <= 1.0
-    assert {p.physics_timestep_ms for p in sample} == set(range(1, 11))
-    assert len({p.seed for p in sample}) == n
+def judged(worm: int, controller: str = "sns", walks: bool = True, message: str = "", step_s: float = STEP_S) -> Judged:
+    wave = WAVE if walks else replace(WAVE, verdict="disordered")
+    return judge(replace(WORM, number=worm), controller, step_s, wave, wave, message)
 
 
-def test_a_point_becomes_a_run_under_every_controller() -> None:
-    point = replace(points()[3], n_segments=5)
-    configs = [point.case(kind).config for kind in CONTROLLERS]
+def test_the_sample_is_a_latin_hypercube_within_its_ranges() -> None:
+    n = 64
+    worms = sample(n)
+    for values in (
+        [one.noise_m / 0.005 for one in worms],
+        [np.log(one.friction / 0.05) / np.log(30.0) for one in worms],
+        [np.log(one.young_modulus_Pa / 0.3e9) / np.log(2.0 / 0.3) for one in worms],
+    ):
+        # Values are rounded by less than a twentieth of a stratum.
+        off = np.sort(values) * n - np.arange(n)
+        assert off.min() > -0.05
+        assert off.max() < 1.05
+
+
+def test_a_worm_becomes_a_run_by_every_controller() -> None:
+    configs = [WORM.case(kind).config for kind in CONTROLLERS]
     assert [config.controller.kind for config in configs] == ["sns", "sns", "sns-robust", "timed"]
     low_m, high_m = tolerance_window_m(configs[0]) or (0.0, 0.0)
-    assert [config.sensor.tolerance_m for config in configs[:2]] == [0.015, point.tolerance_m]
-    assert low_m < point.tolerance_m < high_m
+    assert configs[0].sensor.tolerance_m == 0.015
+    assert low_m < configs[1].sensor.tolerance_m == tolerance_m(WORM.case("sns")) < high_m
     for config in configs:
-        assert config.body.n_segments == 5
-        assert config.sensor.noise_m == point.noise_m
-        assert config.duration_s >= 2 * 0.875 + 2.2 * 5 * 0.875
-        assert config.seed == point.seed
+        assert config.sensor.noise_m == WORM.noise_m
+        assert config.duration_s >= 2 * 0.875 + 2.2 * 3 * 0.875
+        assert config.seed == WORM.number
+    halved = WORM.case("sns-tolerance", half_step=True).config
+    assert 2 * halved.clock.physics_timestep_s == configs[1].clock.physics_timestep_s
+    assert halved.sensor.tolerance_m == configs[1].sensor.tolerance_m
 
 
 def test_verdicts(subtests: pytest.Subtests) -> None:
@@ -63,96 +64,51 @@ def test_verdicts(subtests: pytest.Subtests) -> None:
         ({"wave_fronts": 2}, False, False),
         ({"verdict": "disordered"}, False, False),
         ({"verdict": None}, False, False),
+        ({"period_s": None}, True, False),
     ):
         with subtests.test(f"{change!r:.60}"):
-            point = replace(points()[0], n_segments=3)
             changed = replace(WAVE, **change)  # type: ignore[arg-type]
-            found = judge(0, point, "sns", changed, WAVE)
-            assert (found.walked, found.in_time, found.lengthened) == (walked, in_time, True)
-            assert judge(0, point, "sns", WAVE, changed).lengthened == walked
+            found = judge(WORM, "sns", STEP_S, changed, WAVE)
+            assert (found.walked, found.in_time, found.lengthened) == (walked, in_time, in_time)
+            assert judge(WORM, "sns", STEP_S, WAVE, changed).lengthened == walked
 
 
-def test_a_run_that_a_guard_stopped_did_not_walk() -> None:
-    found = judge(0, replace(points()[0], n_segments=3), "sns", WAVE, WAVE, "too much energy")
+def test_a_run_that_a_guard_stopped_did_not_walk_and_says_why() -> None:
+    found = judged(0, message="too much energy")
     assert (found.walked, found.in_time, found.lengthened) == (False, False, False)
-    assert found.reason == "too much energy"
+    assert found.reason == "stopped: too much energy"
 
 
-def test_shares_count_by_controller() -> None:
-    judged = [Judged(i, "sns", 3, "", None, i < 3, i < 2, i != 1) for i in range(4)]
-    judged += [Judged(0, "sns-robust", 3, "", None, True, True, True)]
-    found = shares(judged)
-    assert [found["sns"][name] for name in ("points", "walked", "in_time", "lengthened")] == [4, 3, 2, 1]
-    assert found["sns"]["share"] == 0.5
-    assert found["sns-robust"]["share"] == 1.0
+def test_a_stopped_worm_counts_as_at_half_the_step_and_others_as_at_their_own() -> None:
+    half = {"step_s": STEP_S / 2}
+    runs = [judged(0, message="energy"), judged(0, **half)]  # type: ignore[arg-type]
+    runs += [judged(1, walks=False), judged(1, **half)]  # type: ignore[arg-type]
+    runs += [judged(2), judged(2, **half), judged(3, walks=False)]  # type: ignore[arg-type]
+    runs += [judged(0, "timed")]
+    sns, timed = shares(runs)
+    assert (sns.worms, sns.walked, sns.in_time, sns.lengthened) == (4, 2, 2, 2)
+    assert (sns.stopped, sns.halved, sns.same) == (1, 2, 1)
+    assert (timed.controller, timed.worms, timed.share, timed.halved) == ("timed", 1, 1.0, 0)
 
 
 def test_the_interval_holds_the_shares_that_a_score_test_accepts(subtests: pytest.Subtests) -> None:
     for successes, n in ((0, 10), (7, 10), (10, 10), (285, 300)):
-        with subtests.test(f"{successes!r:.60}"):
-            judged = [Judged(i, "sns", 3, "", None, True, i < successes, True) for i in range(n)]
-            low, high = shares(judged)["sns"]["interval"]
-            for share in (low, high):
+        with subtests.test(f"{successes} of {n}"):
+            [found] = shares([judged(i, walks=i < successes) for i in range(n)])
+            for share in (found.low, found.high):
                 if 1e-9 < share < 1.0 - 1e-9:
                     assert abs(successes / n - share) == pytest.approx(1.959964 * np.sqrt(share * (1.0 - share) / n))
-            assert low >= 0.0
-            assert high <= 1.0
+            assert 0.0 <= found.low < found.high <= 1.0
 
 
-@pytest.mark.parametrize("n_points", [0, 301])
-def test_points_beyond_the_sample_are_refused(n_points: int, tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match=r"points must be in 1 \.\. 300"):
-        study.robustness(tmp_path, n_points)
-
-
-@pytest.fixture
-def short(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A sample of one worm that stands for a moment."""
-    sample = (replace(points()[0], n_segments=3, physics_timestep_ms=20, noise_m=0.0),)
-    monkeypatch.setattr(study, "points", lambda: sample)
+def test_the_study_runs_stopped_worms_again_and_writes_both_tables(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(study, "CYCLES", 0.05)
-
-
-@pytest.mark.usefixtures("short")
-def test_the_study_keeps_its_results_and_goes_on(tmp_path: Path) -> None:
-    ours = study.robustness(tmp_path, 1, controllers=["sns-robust"])
-    assert [one.controller for one in ours] == ["sns-robust"]
-    pair = ["sns", "sns-robust"]
-    both = study.robustness(tmp_path, 1, controllers=pair)
-    assert both[1:] == ours
-    runs = {path: path.stat().st_mtime_ns for path in tmp_path.glob("runs/*/run.nc")}
-    assert len(runs) == 2
-    assert study.robustness(tmp_path, 1, controllers=pair) == both
-    assert {path: path.stat().st_mtime_ns for path in tmp_path.glob("runs/*/run.nc")} == runs
-    text = (tmp_path / "robustness.json").read_text()
-    assert [one["controller"] for one in json.loads(text)["judged"]] == pair
-    assert json.loads(text)["shares"]["sns"]["in_time"] == 0
-    assert study.robustness(tmp_path, 1, controllers=["sns-robust"]) == both, "a call for fewer leaves the others"
-    assert (tmp_path / "robustness.json").read_text() == text
-
-
-@pytest.mark.usefixtures("short")
-def test_an_interrupted_call_leaves_the_tables_of_what_there_is(tmp_path: Path) -> None:
-    def interrupt(stage: str, done: int, n: int, share: float) -> None:
-        if done:  # By now this process has computed both, and told of one.
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        study.robustness(tmp_path, 1, controllers=["sns", "sns-robust"], progress=interrupt)
-    content = json.loads((tmp_path / "robustness.json").read_text())
-    assert [one["controller"] for one in content["judged"]] == ["sns", "sns-robust"]
-    assert "`sns`" in (tmp_path / "robustness.md").read_text()
-
-
-def test_an_unknown_controller_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match="unknown controller 'shc'"):
-        study.robustness(tmp_path, 1, controllers=["shc"])
-
-
-def test_the_committed_results_are_of_the_sample() -> None:
-    results = Path(__file__).parents[2] / "docs" / "results" / "robustness_three_segments.json"
-    judged = json.loads(results.read_text(encoding="utf-8"))["judged"]
-    assert len({(one["controller"], one["point"]) for one in judged}) == len(judged) > 0
-    for one in judged:
-        assert one["n_segments"] == 3
-        assert one["walked"] or not one["in_time"]
+    monkeypatch.setattr(study, "CONTROLLERS", ("timed",))
+    monkeypatch.setattr(study, "sample", lambda _: [replace(WORM, number=1, noise_m=0.0), replace(WORM, number=4)])
+    written, [table] = study.study(Store(tmp_path / "runs"), tmp_path, "full")
+    assert [path.name for path in written] == ["robustness.csv", "robustness_runs.csv"]
+    rows = np.genfromtxt(written[1], delimiter=",", names=True, dtype=None, encoding="utf-8")
+    assert [*zip(rows["worm"].tolist(), rows["step_s"].tolist(), strict=True)] == [(1, 0.01), (4, 0.01), (4, 0.005)]
+    assert table.row_count == 1

@@ -85,9 +85,7 @@ STIFFNESS = Quantity(
     (0.8, 2.0),
     "Stiffness of the rods",
 )
-WEIGHT = Quantity(
-    "weight", "mass of the worm (kg)", (0.0, 0.77, 1.87, 3.0), weight_changes, (0.0, 1.87), "Weight"
-)
+WEIGHT = Quantity("weight", "mass of the worm (kg)", (0.0, 0.77, 1.87, 3.0), weight_changes, (0.0, 1.87), "Weight")
 FRICTION = Quantity(
     "friction",
     "friction of the ground",

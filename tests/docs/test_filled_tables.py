@@ -65,9 +65,7 @@ NO_WORM = {
 }
 """Result files that are not of presets, and why."""
 
-STALE: tuple[str, ...] = (
-    "weak_middle.csv",
-)
+STALE: tuple[str, ...] = ("weak_middle.csv",)
 """Result files whose worms have changed since: to be measured again."""
 
 LISTS = sorted(path for path in (DOCS / "results").glob("*.toml") if "[runs]" in path.read_text(encoding="utf-8"))

@@ -170,6 +170,37 @@ def test_an_experiment_with_another_payload_is_fitted_beside_the_first(tmp_path:
     assert not found.warnings
 
 
+def test_an_experiment_that_is_held_out_is_predicted_from_the_others(tmp_path: Path) -> None:
+    rng = np.random.default_rng(3)
+    write(tmp_path / "strand.csv", strand_table(rng))
+    write(tmp_path / "heavy.csv", strand_table(rng, **{"body.strands.linear_density_kg_per_m": 0.03}))
+    payload = {"body.strands.linear_density_kg_per_m": 0.03}
+    held = STRAND | {"name": "heavy", "data": "heavy.csv", "set": payload}
+    study = study_of({"young_modulus": {}, "damping_time": {}}, STRAND, held)
+    with pytest.raises(ConfigError, match="unknown experiment 'heay': did you mean 'heavy'"):
+        load_identify_study(study).holding_out(["heay"])
+    found = identify(load_identify_study(study).holding_out(["heavy"]), tmp_path)
+    strand, heavy = found.fit.parts
+    assert (len(strand.held.at), len(heavy.data.at)) == (0, 0)
+    n, inside = found.intervals.held_out["heavy"]
+    assert n == len(heavy.held.at) == len(strand.data.at)
+    assert 0.9 <= inside / n <= 0.99
+    assert heavy.noise == strand.noise
+    assert heavy.rms == pytest.approx(strand.rms, rel=0.3)
+    assert [*tables(found)[1].columns[4].cells] == [
+        f"{strand.noise.effective_points(strand.data):.1f} of {n}",
+        "not fitted",
+    ]
+    alone = identify(load_identify_study(study_of(study["parameters"], STRAND)), tmp_path)
+    assert found.fit.values == pytest.approx(alone.fit.values, rel=1e-6)
+    written = json.loads(write_identified(found, tmp_path)[0].read_text())
+    assert written["experiments"]["heavy"]["held_out"] == n
+    light = identify(
+        load_identify_study(study_of(study["parameters"], STRAND, held | {"set": {}})).holding_out(["heavy"]), tmp_path
+    )
+    assert "points held out lie in their predicted intervals" in light.warnings[-1]
+
+
 def test_what_the_data_cannot_tell_apart_is_said(tmp_path: Path) -> None:
     write(tmp_path / "strand.csv", strand_table(np.random.default_rng(1)))
     density = {"start": 0.02, "low": 0.002, "high": 0.2, "fields": {"body.strands.linear_density_kg_per_m": 1.0}}

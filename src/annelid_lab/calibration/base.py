@@ -22,7 +22,7 @@ Found = Mapping[str, Array]
 FEWEST = 8
 """Points that an experiment must have."""
 MOST_HELD = 0.8
-"""Share of the points that may be held out."""
+"""Share of the points that may be held out of an experiment that is fitted."""
 OFF_SCALE = 20.0
 """Data that are so many times as large or as small as the worm's have another unit than their columns say."""
 UNITS = {"Pa": ((1e9, "GPa"), (1e6, "MPa")), "m": ((1e-3, "mm"),)}
@@ -75,7 +75,8 @@ class Experiment(Kind):
         default=None, description="standard deviation of the noise of one point, in the values' unit; none: estimated"
     )
     hold_out: tuple[tuple[Share, Share], ...] = Field(
-        default=(), description="parts of the points, in order from 0 to 1, that are predicted and not fitted"
+        default=(),
+        description="parts of the points, in order from 0 to 1, that are predicted and not fitted; [[0, 1]]: all",
     )
     set: Mapping[str, Any] = Field(
         default_factory=dict, description="fields of the worm that differ in this experiment, as a payload or the floor"
@@ -104,8 +105,11 @@ class Experiment(Kind):
         held = np.zeros(len(place), dtype=bool)
         for low, high in self.hold_out:
             held |= (place >= low) & (place < high)
-        if held.sum() > MOST_HELD * len(held):
-            raise ConfigError(f"experiments.{self.name}.hold_out leaves {(~held).sum()} of {len(held)} points to fit")
+        if not held.all() and held.sum() > MOST_HELD * len(held):
+            raise ConfigError(
+                f"experiments.{self.name}.hold_out leaves {(~held).sum()} of {len(held)} points to fit: hold out at "
+                f"most {MOST_HELD:.0%} of them, or all of the experiment with [[0, 1]]"
+            )
         return held
 
     def test(self, config: RunConfig, data: Data) -> Test | None:

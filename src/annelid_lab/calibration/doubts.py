@@ -21,6 +21,8 @@ WRONG = 1.25
 independent points varies by 5 %, a noise estimated from 800 samples by 3 %; a walk's depend on each other."""
 LEAST_WRONG = 0.01
 """Of the standard deviation of the points: what is less does not matter."""
+LEAST_INSIDE = 0.5
+"""Share of the points held out that must lie in their predicted intervals."""
 UNLIKE = 0.5
 """Rms of a fit, of the standard deviation of the points, above which they are those of another robot."""
 
@@ -39,6 +41,12 @@ def doubts(fit: Fit, known: Intervals) -> tuple[str, ...]:
         )
     for part in fit.parts:
         found += [f"{part.experiment.name}: {sentence}" for sentence in [*part.doubts, *_lacking(part)]]
+    for name, (n, inside) in known.held_out.items():
+        if inside < LEAST_INSIDE * n:
+            found.append(
+                f"{name}: {inside} of {n} points held out lie in their predicted intervals: the model lacks something "
+                "that acts there, or a parameter of it is not fitted"
+            )
     return tuple(found)
 
 
@@ -74,6 +82,8 @@ def confused(names: Sequence[str], correlation: Array, errors: Array, directions
 
 def _lacking(part: Part) -> list[str]:
     """Says that the points are those of another robot, or lie farther from the model than noise and scatter explain."""
+    if not part.is_fitted:
+        return []
     means = np.bincount(part.data.series, part.data.values) / np.maximum(np.bincount(part.data.series), 1)
     changes = float(np.sqrt(((part.data.values - means[part.data.series]) ** 2).mean()))
     factor, unit = shown_in(part.data.unit, part.rms)

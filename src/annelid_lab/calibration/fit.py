@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import sqrt
 from pathlib import Path
 
 import numpy as np
@@ -86,6 +87,11 @@ class Part:
     doubts: list[str]
 
     @property
+    def is_fitted(self) -> bool:
+        """Whether any of its points are fitted."""
+        return len(self.data.at) > 0
+
+    @property
     def residual(self) -> Array:
         """Measured less fitted, ``(n,)``."""
         return self.data.values - self.fitted
@@ -97,8 +103,9 @@ class Part:
 
     @property
     def rms(self) -> float:
-        """Root mean square of the residuals."""
-        return float(np.sqrt((self.residual**2).mean()))
+        """Root mean square of the residuals; of the points held out where all are."""
+        rest = self.residual if self.is_fitted else self.held.values - self.held_fitted
+        return float(np.sqrt((rest**2).mean()))
 
     @property
     def information(self) -> Array:
@@ -250,7 +257,8 @@ def plain(model: Model, one: Tried) -> Errors:
     for own, data, held, there in zip(
         model.study.experiments, model.data, model.rows, model.measured(one), strict=True
     ):
-        size = float(np.sqrt(((data.values - there)[~held] ** 2).mean()))
+        rest = (data.values - there)[~held]
+        size = sqrt(float((rest**2).sum()) / max(len(rest), 1))
         noises.append(Noise(max(size, own.noise_sd or 0.0, LEAST_NOISE * float(np.ptp(data.values)))))
     return Errors(model, noises)
 
@@ -348,10 +356,12 @@ def _goal(model: Model, emulator: Emulator, best: Tried) -> tuple[float, Array, 
     In the first, ``(p,)``, every parameter moves the points clearly farther than worms scatter; in the second, the data
     leave it open.
     """
-    sizes = [noise.noise for noise in plain(model, best).noises]
-    slopes = [j[~held] for j, held in zip(emulator.derivatives(best.logs), model.rows, strict=True)]
-    scatter = zip(emulator.scatter(), model.rows, sizes, strict=True)
-    off = np.sqrt(max(np.diag(own)[~held].mean() / size**2 for own, held, size in scatter))
+    all_parts = zip(
+        plain(model, best).noises, emulator.derivatives(best.logs), emulator.scatter(), model.rows, strict=True
+    )
+    fitted = [(noise.noise, j[~held], np.diag(s)[~held]) for noise, j, s, held in all_parts if not held.all()]
+    sizes, slopes = [size for size, _, _ in fitted], [j for _, j, _ in fitted]
+    off = np.sqrt(max(scatter.mean() / size**2 for size, _, scatter in fitted))
     moves = np.mean([(j**2).mean(axis=0) / size**2 for j, size in zip(slopes, sizes, strict=True)], axis=0)
     rows = np.concatenate([j / size for j, size in zip(slopes, sizes, strict=True)])
     return float(off), CLEAR * off / np.sqrt(np.maximum(moves, 1e-12)), REACH * np.sqrt(np.diag(inverse(rows.T @ rows)))
@@ -390,7 +400,8 @@ def _finish(fit: Fit, low: Array, high: Array) -> list[Array]:
     from scipy.stats import norm, qmc
 
     moving = fit.emulator.model.moving
-    if not moving or max(float(np.diag(p.scatter).mean()) / p.noise.noise**2 for p in fit.parts) < SMOOTH**2:
+    rough = (float(np.diag(p.scatter).mean()) / p.noise.noise**2 for p in fit.parts if p.is_fitted)
+    if not moving or max(rough) < SMOOTH**2:
         return []
     shares = qmc.Halton(len(moving), rng=2027).random(2 * n_terms(len(moving), 2))
     spread = np.linalg.cholesky(fit.covariance[np.ix_(moving, moving)])
@@ -430,12 +441,23 @@ def _fit_of(
 
 
 def _errors(fit: Fit) -> list[Noise]:
-    """Estimates the errors of every experiment from the residuals at the emulator's optimum."""
+    """Estimates the errors of every experiment from the residuals at the emulator's optimum.
+
+    One that is held out has those of the first fitted one of its kind, or what is known of its noise.
+    """
     prior = fit.prior[1].T @ fit.prior[1]
-    elsewhere = [sum((other.information for other in fit.parts if other is not part), prior) for part in fit.parts]
+    found = []
+    for part in fit.parts:
+        if part.is_fitted:
+            known = sum((other.information for other in fit.parts if other is not part), prior)
+            rest, stated = part.data.values - part.smooth, part.experiment.noise_sd
+            found.append(estimated(part.data, rest, part.jacobian, known, stated, part.scatter))
+        else:
+            found.append(part.noise)
+    of_kind = {
+        part.experiment.kind: noise for part, noise in reversed([*zip(fit.parts, found, strict=True)]) if part.is_fitted
+    }
     return [
-        estimated(
-            part.data, part.data.values - part.smooth, part.jacobian, known, part.experiment.noise_sd, part.scatter
-        )
-        for part, known in zip(fit.parts, elsewhere, strict=True)
+        noise if part.is_fitted else of_kind.get(part.experiment.kind, noise)
+        for part, noise in zip(fit.parts, found, strict=True)
     ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import sqrt
+from math import inf, sqrt
 
 import numpy as np
 
@@ -64,7 +64,9 @@ def intervals(fit: Fit, model: Model) -> Intervals:
 
 
 def _freedom(fit: Fit, part: Part) -> float:
-    """Degrees of freedom of an experiment's errors, less the parameters that it determines."""
+    """Degrees of freedom of an experiment's errors, less the parameters that it determines; none limit one held out."""
+    if not part.is_fitted:
+        return inf
     fitted_away = float(np.trace(fit.covariance @ part.information))
     return max(part.noise.freedom(part.data) - fitted_away, FEWEST_FREE)
 

@@ -80,7 +80,8 @@ class Identified:
                     "points": len(part.data.at),
                     "effective_points": part.noise.effective_points(part.data),
                     "rms": part.rms,
-                    "rms_share": part.rms / float(np.abs(part.data.values).max()),
+                    "rms_share": part.rms
+                    / max(float(np.abs(of.values).max()) for of in (part.data, part.held) if len(of.at)),
                     "noise_sd": part.noise.noise,
                     "discrepancy_sd": part.noise.discrepancy,
                     "discrepancy_length": part.noise.length,
@@ -152,9 +153,9 @@ def tables(found: Identified) -> list[Table]:
         second.add_row(
             part.experiment.name,
             f"{part.rms / factor:.3g}{unit}",
-            f"{part.noise.noise / factor:.3g}{unit}",
-            f"{part.noise.discrepancy / factor:.3g}{unit}",
-            f"{part.noise.effective_points(part.data):.1f} of {len(part.data.at)}",
+            f"{part.noise.noise / factor:.3g}{unit}" if part.is_fitted else "",
+            f"{part.noise.discrepancy / factor:.3g}{unit}" if part.is_fitted else "",
+            f"{part.noise.effective_points(part.data):.1f} of {len(part.data.at)}" if part.is_fitted else "not fitted",
             f"{inside} of {n} inside" if n else "",
         )
     return [first, second]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from math import log, log1p, sqrt
 from pathlib import Path
 from typing import Annotated, Any, Self
@@ -157,6 +157,21 @@ class IdentifyStudy(Section):
                 raise ConfigError(f"unknown parameter {shown(name)}: {suggest(name, known)}")
         chosen = {name: known[name].model_dump(exclude_none=True) for name in names}
         return check_section(IdentifyStudy, {**self.model_dump(exclude_none=True), "parameters": chosen})
+
+    def holding_out(self, names: Collection[str]) -> IdentifyStudy:
+        """Returns the study with these experiments predicted and not fitted.
+
+        Raises:
+            ConfigError: There is none of a name.
+        """
+        known = [one.name for one in self.experiments]
+        for name in names:
+            if name not in known:
+                raise ConfigError(f"unknown experiment {shown(name)}: {suggest(name, known)}")
+        each = [
+            one.model_copy(update={"hold_out": ((0.0, 1.0),)} if one.name in names else {}) for one in self.experiments
+        ]
+        return self.model_copy(update={"experiments": tuple(each)})
 
     def source(self, folder: Path) -> str:
         """Returns the preset that the study starts from, or the path of the file in the study's folder."""

@@ -39,6 +39,10 @@ def calibrate_command(
         list[str] | None,
         typer.Option(metavar="PARAMETER", help="Fit only these; may be repeated.  [default: those of the study]"),
     ] = None,
+    hold_out: Annotated[
+        list[str] | None,
+        typer.Option(metavar="EXPERIMENT", help="Predict it from the others, and do not fit it; may be repeated."),
+    ] = None,
     jobs: Jobs = None,
     example: Annotated[
         Literal["walk", "robot"] | None,
@@ -68,6 +72,8 @@ def calibrate_command(
     annelid calibrate --example walk -o mine
     annelid calibrate mine/study.toml -o mine
     annelid calibrate --free young_modulus --free spring_rate
+    annelid calibrate --hold-out frame --free young_modulus \\
+        --free softening_strain
     annelid run mine/calibrated.toml --uncertainty 8 \\
         --uncertainty-from mine/calibration.json
     """
@@ -86,6 +92,7 @@ def calibrate_command(
     loaded = load_identify_study(source)
     loaded = loaded.model_copy(update={"set": {**loaded.set, **overrides_of(assignments)}})
     loaded = loaded.only(free) if free else loaded
+    loaded = loaded.holding_out(hold_out) if hold_out else loaded
     with kept_runs(output, jobs=jobs, quiet=quiet) as store:
         refuse_existing(output / REPORT, force)
         simulations = Simulations(store.folder, store.executor, store.progress)

@@ -4,20 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from math import pi
+from math import nan, pi
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 
-from annelid.analysis import Passage, passage_of
+from annelid.analysis import Passage, mean_and_interval, passage_of
 from annelid.draw import canvas, draw_lines, line_looks, panel_title, save_both
 from annelid.experiment import Case, Store
 from annelid.morphology import Array
 from annelid.simulation import Run
-from annelid_studies.standard_cases import Effort
-from annelid_studies.tables import YES, Results, TerminalTable, grouped, tabulated, terminal_table, write_fields
+from annelid_studies.standard_cases import Effort, perturbed
+from annelid_studies.tables import (
+    YES,
+    Results,
+    TerminalTable,
+    grouped,
+    interval,
+    tabulated,
+    terminal_table,
+    write_fields,
+)
 
 PRESET = "riddle2025-muscles"
 CM = 100.0
@@ -31,7 +40,7 @@ TURN_S = 0.27
 """Time from one segment to the next in bends: about that of the paper's network on this body on open ground."""
 TIMED = {"controller": {"kind": "timed", "rise_s": TURN_S, "hold_s": TURN_S, "fall_s": TURN_S, "interval_s": TURN_S}}
 LIFT, MOTOR_TIME_CONSTANT_S = 0.45, 0.35
-FIXED, ADAPTIVE = "fixed", "adaptive"
+FIXED, ADAPTIVE, PAPERS = "fixed", "adaptive", "paper's SNS"
 SLOW_S, FAST_S = 45.0, 30.0
 
 
@@ -42,7 +51,7 @@ def _robust(**changes: Any) -> dict[str, Any]:
 BEND_GAITS: Mapping[str, Mapping[str, Any]] = {
     "timed 3x1": TIMED,
     "reactive": {**TIMED, "turning": {"kind": "touch"}},
-    "paper's SNS": {},
+    PAPERS: {},
     "robust SNS": _robust(turn_ms=1e3 * TURN_S),
 }
 """All on half-rings; the reactive one is the timed one that turns away from contact as the authors published it."""
@@ -50,7 +59,7 @@ NARROW_GAITS: Mapping[str, Mapping[str, Any]] = {
     FIXED: {"duration_s": SLOW_S, **_robust()},
     ADAPTIVE: {"duration_s": SLOW_S, **_robust(descending={"lift": LIFT})},
     "full drive": {"duration_s": FAST_S, **_robust(descending={"lift": LIFT, "drive": 1.0})},
-    "paper's SNS": {"duration_s": FAST_S},
+    PAPERS: {"duration_s": FAST_S},
     "timed 3x1": {"duration_s": FAST_S, **TIMED},
 }
 """The first three are one network: without drive, with that of pressed backs, and with full drive throughout."""
@@ -64,6 +73,10 @@ BEND_SPEED_M_PER_S = 0.1
 """Runs in bends last as long as a worm of this speed takes to bring its middle through."""
 
 
+DRAWN_RADIUS_M = 0.6
+"""Radius of the bend in which gaits are compared over several frictions."""
+
+
 class Trial(NamedTuple):
     """One worm in one pipe."""
 
@@ -71,6 +84,11 @@ class Trial(NamedTuple):
     gait: str  # Key of `BEND_GAITS` or `NARROW_GAITS`
     radius_m: float  # Radius of the bend's centre line; 0 for a straight pipe
     case: Case  # Its run
+
+    @property
+    def is_drawn(self) -> bool:
+        """Whether it is run with eight frictions as well, and once at half the step."""
+        return self.gait != PAPERS and self.radius_m in (0.0, DRAWN_RADIUS_M)
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,6 +100,10 @@ class Reading:
     radius_m: float  # As the trial's
     passed: bool  # Whether the middle of the worm came out of what bends or narrows
     speed_m_per_s: float  # Speed of the foremost ring along the centre line through there
+    drawn_speed_m_per_s: float  # The same, mean over runs with frictions within one percent; NaN without them
+    drawn_speed_low: float  # Ends of its 95 % interval
+    drawn_speed_high: float
+    half_step_speed_m_per_s: float  # The same at half the step, of the first of those runs
     front_m: float  # Arc length that the foremost ring came to
     in_order: bool | None  # Whether segments contracted in the order 1-2-..-N throughout
     work_J_per_m: float | None  # Net work of the muscles per metre of the middle's path, over the whole run
@@ -131,10 +153,22 @@ def _course(run: Run, passage: Passage) -> Course:
 def study(store: Store, output: Path, effort: Effort) -> Results:
     """The study `pipes`; a run that ended before its second posture is a RunFileError."""
     wanted = trials(effort == "quick")
+    further = {
+        trial[:3]: perturbed(trial.case, CONTACTS["friction"])
+        for trial in wanted
+        if effort == "full" and trial.is_drawn
+    }
     store.compute([trial.case for trial in wanted], "pipes")
+    store.compute([case for drawn, halved in further.values() for case in (*drawn, halved)], "other frictions")
+
+    def speed(case: Case) -> float:
+        return passage_of(store.run(case)).speed_m_per_s()
+
     readings, courses = [], {}
     for trial in wanted:
         run = store.run(trial.case)
+        drawn, halved = further.get(trial[:3], ([], None))
+        mean, low, high = mean_and_interval([speed(case) for case in drawn])
         passage, found = passage_of(run), store[trial.case].summary
         work_J = found.energy_muscle_work_J
         path_m = float(passage.middle_m[-1] - passage.middle_m[0])
@@ -143,6 +177,10 @@ def study(store: Store, output: Path, effort: Effort) -> Results:
                 *trial[:3],
                 passed=passage.passed,
                 speed_m_per_s=passage.speed_m_per_s(),
+                drawn_speed_m_per_s=mean,
+                drawn_speed_low=low,
+                drawn_speed_high=high,
+                half_step_speed_m_per_s=nan if halved is None else speed(halved),
                 front_m=float(passage.front_m.max()),
                 in_order=found.wave,
                 work_J_per_m=None if work_J is None or path_m <= 0 else work_J / path_m,
@@ -163,6 +201,9 @@ def pipes_table(readings: Sequence[Reading]) -> TerminalTable:
         "gait": lambda one: one.gait,
         "passed": lambda one: YES[one.passed],
         "speed (cm/s)": lambda one: f"{CM * one.speed_m_per_s:.2f}",
+        "drawn, 95 %": lambda one: interval(
+            CM * one.drawn_speed_m_per_s, CM * one.drawn_speed_low, CM * one.drawn_speed_high
+        ),
         "front at (m)": lambda one: f"{one.front_m:.2f}",
         "in order": lambda one: YES[one.in_order],
         "net work (J/m)": lambda one: "-" if one.work_J_per_m is None else f"{one.work_J_per_m:.0f}",

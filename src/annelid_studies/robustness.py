@@ -122,7 +122,9 @@ def sample(n: int) -> list[Worm]:
 
 def tolerance_m(case: Case) -> float:
     """Returns the middle of the window that a body's stretch sensors need, m."""
-    window = worm_of(case.config).tolerance_window_m(case.config.arena.friction)
+    config = case.config
+    assert config.arena is not None
+    window = worm_of(config).tolerance_window_m(config.arena.friction)
     assert window is not None, "the rule is for this body"
     return round(sum(window) / 2.0, 4)
 

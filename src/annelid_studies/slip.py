@@ -31,7 +31,7 @@ PRESET = "riddle2025-muscles"
 TUNED_AT = 0.7
 """Friction at which feedback and timed wave were tuned."""
 FRICTIONS: Mapping[Effort, tuple[float, ...]] = {"full": (0.3, 0.7, 1.0), "quick": (0.7, 1.0)}
-DRAWS: Mapping[Effort, int] = {"full": 4, "quick": 2}
+DRAWS: Mapping[Effort, int] = {"full": 8, "quick": 2}
 DURATION_S = 14.0
 """Long enough for four whole cycles behind the first two contractions of segment 1."""
 PLAIN, EXTENSION, PRESSURE, TIMED = "paper's network", "feedback, no pressure", "pressure feedback", "timed wave"
@@ -76,9 +76,10 @@ def case(controller: str, friction: float, **changes: Any) -> Case:
 def feedback(store: Store, output: Path, effort: Effort, half_step: bool = False) -> Results:
     """The study `slip`."""
     steps = finer_steps(load_config(PRESET))[0] if half_step else {}
+    draws = DRAWS[effort] // 2 if half_step else DRAWS[effort]
     cases = {
         (friction, controller): [
-            case(controller, friction, **steps, **drawn) for drawn in drawn_frictions(friction, DRAWS[effort])
+            case(controller, friction, **steps, **drawn) for drawn in drawn_frictions(friction, draws)
         ]
         for friction in FRICTIONS[effort]
         for controller in CONTROLLERS

@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from annelid.experiment import Case
+from annelid.experiment import Case, finer_steps
 
 Effort = Literal["quick", "full"]
 """Coarse and within minutes, or the whole."""
@@ -56,6 +56,12 @@ def one_after_the_other(n_segments: int = 3, hold_s: float = HOLD_S, rest_s: flo
         {"segment": i, "start_s": start, "stop_s": round(start + hold_s, 9)} for i, start in enumerate(starts, start=1)
     ]
     return {"controller": {"kind": "program", "contractions": contractions}, "duration_s": contractions[-1]["stop_s"]}
+
+
+def perturbed(case: Case, friction: float, n: int = 8) -> tuple[list[Case], Case]:
+    """Returns a case with n frictions within `FRICTION_SPREAD` of one, and the first of these at half the step."""
+    drawn = [case.but(changes) for changes in drawn_frictions(friction, n)]
+    return drawn, drawn[0].but(finer_steps(drawn[0].config)[0])
 
 
 def drawn_frictions(friction: float, n: int) -> list[dict[str, Any]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import astuple
+from math import isfinite
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -34,6 +35,11 @@ def grouped(items: Iterable[T], key: Callable[[T], K]) -> dict[K, list[T]]:
 def tabulated(rows: Iterable[T], columns: Mapping[str, Callable[[T], str]]) -> Table:
     """Makes a table of things, one a row, from what each column writes of a row, by its head."""
     return Table(list(columns), [[cell(row) for cell in columns.values()] for row in rows])
+
+
+def interval(mean: float, low: float, high: float) -> str:
+    """Formats a mean with the ends of its interval; nothing for one that there is not."""
+    return f"{mean:.1f} ({low:.1f} .. {high:.1f})" if isfinite(mean) else ""
 
 
 def records(table: Table) -> list[dict[str, str]]:

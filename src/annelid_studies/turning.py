@@ -10,17 +10,29 @@ from typing import Any
 
 import numpy as np
 
-from annelid.analysis import Track, track_of
+from annelid.analysis import Track, mean_and_interval, track_of
 from annelid.draw import canvas, draw_lines, line_looks, panel_title, save_both
 from annelid.errors import RunFileError
 from annelid.experiment import Case, Store
-from annelid_studies.standard_cases import Effort
-from annelid_studies.tables import YES, Results, TerminalTable, grouped, tabulated, terminal_table, write_fields
+from annelid_studies.standard_cases import Effort, perturbed
+from annelid_studies.tables import (
+    YES,
+    Results,
+    TerminalTable,
+    grouped,
+    interval,
+    tabulated,
+    terminal_table,
+    write_fields,
+)
 
 COUNTER = (1.0, 1.0, -1.0, -1.0, 1.0, 1.0)
 """Shares of six segments: the ends bend to one side, the middle to the other."""
 MODULATIONS = (-0.9, -0.6, -0.3, 0.0, 0.3, 0.6, 0.9)
-QUICK = (-0.9, 0.9)
+DRAWN = (-0.6, 0.6)
+"""Modulations that are run with eight frictions as well, and once at half the step."""
+FRICTION = 0.7
+"""Of the presets' floor."""
 LARGEST_RADIUS_M = 20.0
 """Where the axis of the radius ends: a worm that turns more weakly than this goes straight."""
 
@@ -116,7 +128,11 @@ class Reading:
     cycle_s: float  # Time of a cycle
     speed_m_per_s: float  # Path of the body's middle from cycle to cycle, over time
     turn_deg_per_cycle: float  # Change of the heading
-    curvature_per_m: float  # The same over the path
+    drawn_turn_deg_per_cycle: float  # The same, mean over runs with frictions within one percent; NaN without them
+    drawn_turn_low: float  # Ends of its 95 % interval
+    drawn_turn_high: float
+    half_step_turn_deg_per_cycle: float  # The same at half the step, of the first of those runs
+    curvature_per_m: float  # Turn over the path
     radius_m: float  # Radius of the circle; infinite for a straight path
     roll_deg: float  # Farthest that the body rolled about its length since the start, positive where its left side rose
     command: str  # The command line that makes the run
@@ -124,15 +140,29 @@ class Reading:
 
 def study(store: Store, output: Path, effort: Effort) -> Results:
     """The study `turning`; a run that ended before its second cycle is a RunFileError."""
-    modulations = QUICK if effort == "quick" else MODULATIONS
+    modulations = DRAWN if effort == "quick" else MODULATIONS
     cases = [(gait, modulation, gait.case(modulation)) for gait in GAITS for modulation in modulations]
+    further = {
+        (gait.name, modulation): perturbed(case, FRICTION)
+        for gait, modulation, case in cases
+        if effort == "full" and modulation in DRAWN
+    }
     store.compute([case for _, _, case in cases], "turning")
-    readings, tracks = [], []
-    for gait, modulation, case in cases:
+    store.compute([case for drawn, halved in further.values() for case in (*drawn, halved)], "other frictions")
+
+    def read(gait: Gait, case: Case) -> tuple[Track, float, Turn, float]:
         track, found = track_of(store.run(case)), store[case].summary
         timed = not case.config.controller.sensor_fields
         cycle_s = gait.cycle_s if timed or found.period_s is None else found.period_s
         turn = turn_of(track, cycle_s, after_s=cycle_s)
+        return track, cycle_s, turn, math.degrees(turn.angle_rad) / turn.cycles
+
+    readings, tracks = [], []
+    for gait, modulation, case in cases:
+        track, cycle_s, turn, turn_deg = read(gait, case)
+        found = store[case].summary
+        drawn, halved = further.get((gait.name, modulation), ([], None))
+        mean, low, high = mean_and_interval([read(gait, one)[3] for one in drawn])
         readings.append(
             Reading(
                 gait=gait.name,
@@ -140,7 +170,11 @@ def study(store: Store, output: Path, effort: Effort) -> Results:
                 wave=found.wave,
                 cycle_s=cycle_s,
                 speed_m_per_s=turn.path_m / (turn.cycles * cycle_s),
-                turn_deg_per_cycle=math.degrees(turn.angle_rad) / turn.cycles,
+                turn_deg_per_cycle=turn_deg,
+                drawn_turn_deg_per_cycle=mean,
+                drawn_turn_low=low,
+                drawn_turn_high=high,
+                half_step_turn_deg_per_cycle=math.nan if halved is None else read(gait, halved)[3],
                 curvature_per_m=turn.curvature_per_m,
                 radius_m=turn.radius_m,
                 roll_deg=math.degrees(track.roll_rad[np.abs(track.roll_rad).argmax()]),
@@ -161,6 +195,7 @@ def turning_table(readings: Sequence[Reading]) -> TerminalTable:
         "cycle (s)": lambda one: f"{one.cycle_s:.2f}",
         "speed (m/s)": lambda one: f"{one.speed_m_per_s:.3f}",
         "turn a cycle (deg)": lambda one: f"{one.turn_deg_per_cycle:.1f}",
+        "drawn, 95 %": lambda one: interval(one.drawn_turn_deg_per_cycle, one.drawn_turn_low, one.drawn_turn_high),
         "radius (m)": lambda one: f"{one.radius_m:.3g}",
         "rolled (deg)": lambda one: f"{one.roll_deg:.0f}",
     }

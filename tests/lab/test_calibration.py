@@ -173,8 +173,8 @@ def test_an_experiment_with_another_payload_is_fitted_beside_the_first(tmp_path:
 def test_an_experiment_that_is_held_out_is_predicted_from_the_others(tmp_path: Path) -> None:
     rng = np.random.default_rng(3)
     write(tmp_path / "strand.csv", strand_table(rng))
-    write(tmp_path / "heavy.csv", strand_table(rng, **{"body.strands.linear_density_kg_per_m": 0.03}))
-    payload = {"body.strands.linear_density_kg_per_m": 0.03}
+    payload: dict[str, Any] = {"body.strands.linear_density_kg_per_m": 0.03}
+    write(tmp_path / "heavy.csv", strand_table(rng, **payload))
     held = STRAND | {"name": "heavy", "data": "heavy.csv", "set": payload}
     study = study_of({"young_modulus": {}, "damping_time": {}}, STRAND, held)
     with pytest.raises(ConfigError, match="unknown experiment 'heay': did you mean 'heavy'"):

@@ -55,7 +55,7 @@ def identify_figure(fit: Fit, known: Intervals, stem: str | Path) -> Path:
         axes.set_xticks(range(len(fit.names)), words, rotation=45, ha="right")
         axes.set_yticks(range(len(fit.names)), words)
         axes.grid(visible=False)
-        panel_title(axes, "correlation of the errors")
+        panel_title(axes, "correlations")
         for empty in panels[last + 1 :]:
             empty.set_axis_off()
         return save_both(figure, stem)

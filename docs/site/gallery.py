@@ -230,6 +230,41 @@ def _challenge(job: Job) -> Path:
     return report.ranking_figure(scores.read_scores(job.results), job.stem)
 
 
+COMPARED = ("annelid, rods", "annelid, chain", "dismech-newton", "PyElastica")
+"""Programs of `_costs`; the others are annelid's with another contact."""
+
+
+def _costs(job: Job) -> Path:
+    """Draws how far the walk of each program lies from that of annelid's finest rods over its processor time."""
+    from annelid.draw import canvas, panel_title, save_both
+
+    rows = [row for row in _rows(job) if row["program"] in COMPARED]
+    finest = max((row for row in rows if row["program"] == COMPARED[0]), key=lambda row: float(row["s_per_s"]))
+    with canvas(3.4) as figure:
+        panels = figure.subplots(1, 2)
+        for axes, name, title in zip(panels, ("elongation_m", "travel_m"), ("elongation", "travel"), strict=True):
+            columns = [column for column in finest if column.startswith(f"{name}_")]
+            for program, marker in zip(COMPARED, "os^D", strict=True):
+                own = [row for row in rows if row["program"] == program and row is not finest]
+                means = [sum(float(row[column]) for column in columns) for row in (finest, *own)]
+                axes.plot(
+                    [float(row["s_per_s"]) for row in own],
+                    [100.0 * abs(mean / means[0] - 1.0) for mean in means[1:]],
+                    marker=marker,
+                    linestyle="none",
+                    label=program,
+                )
+            axes.set(
+                xscale="log",
+                yscale="log",
+                xlabel="processor time for a second (s)",
+                ylabel="off annelid's finest run (%)",
+            )
+            panel_title(axes, title)
+        figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=len(COMPARED))
+        return save_both(figure, job.stem)
+
+
 def makers() -> Mapping[str, Callable[[Job], Path]]:
     """All that an entry of the list can ask for."""
     from annelid_studies.riddle2025 import paper, runs
@@ -243,6 +278,7 @@ def makers() -> Mapping[str, Callable[[Job], Path]]:
         "challenge": _challenge,
         "riddle2025": partial(_fields, paper.speeds_picture, runs.Reading),
         "bench": _bench,
+        "costs": _costs,
         "tuning": _tuning,
         "uncertainty": _uncertainty,
     }

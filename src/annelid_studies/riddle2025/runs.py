@@ -19,7 +19,6 @@ from annelid_studies.standard_cases import Effort, drawn_frictions
 GAITS: Mapping[str, Mapping[str, Any]] = {
     "3x1": {},
     "2x1": {"controller.interval_s": 2.0},
-    "2x2": {"controller.interval_s": 2.0, "controller.waves": 2},
     "3x1, touch": {"turning": {"kind": "touch"}},
     "3x1, as in 2026": {"body.springs.stiffness_N_per_m": 75.0, "body.rings.force_limit_N": 100.0},
 }
@@ -42,7 +41,7 @@ FRICTIONS = (0.1, 0.3, 0.7, 1.0)
 """Of flat ground; the authors have 0.01 and 0.1, 0.2, .. 1.0."""
 NARROW_M, WIDE_M = 0.16, 0.20
 """Radii of the authors' pipes of 2025 and of 2026."""
-RADII_M: Mapping[str, tuple[float, ...]] = {"servos": (0.3, 0.4, 0.5, 0.7), "muscles": (0.3, 0.5)}
+RADII_M: Mapping[str, tuple[float, ...]] = {"servos": (0.3, 0.5, 0.7), "muscles": (0.3, 0.5)}
 """Of the bends' centre lines in the narrow pipe; the authors have 0.2, 0.3, .. 0.9 m."""
 TIGHT_M = 0.3
 """Radius of the bend that the paper has soft worms pass alone."""
@@ -121,7 +120,6 @@ def points(effort: Effort) -> list[Point]:
         return [*flat, Point("2x1", friction=1.0), *bends, Point("3x1, as in 2026", bore_m=WIDE_M)]
     whole = [Point("3x1", *worm) for worm in product(RINGS, (STIFF, SOFT), FRICTIONS)]
     whole += [Point("2x1", *worm) for worm in product(RINGS, (STIFF, SOFT), (0.3, 0.7))]
-    whole += [Point("2x2", friction=mu) for mu in (0.3, 0.7)]
     for rings, radii in RADII_M.items():
         whole += [Point("3x1", rings, E, 0.3, NARROW_M, r) for E, r in product((STIFF, SOFT), radii)]
     whole += [Point(modulus_GPa=1.0, bore_m=NARROW_M, radius_m=TIGHT_M)]

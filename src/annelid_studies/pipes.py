@@ -200,16 +200,17 @@ def pipes_table(readings: Sequence[Reading]) -> TerminalTable:
         "pipe": lambda one: f"bend {one.radius_m:g} m" if one.radius_m else one.arena,
         "gait": lambda one: one.gait,
         "passed": lambda one: YES[one.passed],
-        "speed (cm/s)": lambda one: f"{CM * one.speed_m_per_s:.2f}",
-        "drawn, 95 %": lambda one: interval(
-            CM * one.drawn_speed_m_per_s, CM * one.drawn_speed_low, CM * one.drawn_speed_high
+        "speed (cm/s)": lambda one: (
+            interval(CM * one.drawn_speed_m_per_s, CM * one.drawn_speed_low, CM * one.drawn_speed_high)
+            or f"{CM * one.speed_m_per_s:.2f}"
         ),
         "front at (m)": lambda one: f"{one.front_m:.2f}",
         "in order": lambda one: YES[one.in_order],
         "net work (J/m)": lambda one: "-" if one.work_J_per_m is None else f"{one.work_J_per_m:.0f}",
         "slip ratio": lambda one: "-" if one.slip_ratio is None else f"{one.slip_ratio:.2f}",
     }
-    return terminal_table(tabulated(readings, columns), "Pipes", n_words=2)
+    caption = "after ±: half of the 95 % interval over eight frictions"
+    return terminal_table(tabulated(readings, columns), "Pipes", n_words=2, caption=caption)
 
 
 def pipes_picture(readings: Sequence[Reading], courses: Courses, stem: Path) -> Path:

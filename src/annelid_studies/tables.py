@@ -38,8 +38,8 @@ def tabulated(rows: Iterable[T], columns: Mapping[str, Callable[[T], str]]) -> T
 
 
 def interval(mean: float, low: float, high: float) -> str:
-    """Formats a mean with the ends of its interval; nothing for one that there is not."""
-    return f"{mean:.1f} ({low:.1f} .. {high:.1f})" if isfinite(mean) else ""
+    """Formats a mean and half of the interval that lies about it; nothing for one that there is not."""
+    return f"{mean:.1f}±{(high - low) / 2:.1f}" if isfinite(mean) else ""
 
 
 def records(table: Table) -> list[dict[str, str]]:

@@ -194,12 +194,15 @@ def turning_table(readings: Sequence[Reading]) -> TerminalTable:
         "in order": lambda one: YES[one.wave],
         "cycle (s)": lambda one: f"{one.cycle_s:.2f}",
         "speed (m/s)": lambda one: f"{one.speed_m_per_s:.3f}",
-        "turn a cycle (deg)": lambda one: f"{one.turn_deg_per_cycle:.1f}",
-        "drawn, 95 %": lambda one: interval(one.drawn_turn_deg_per_cycle, one.drawn_turn_low, one.drawn_turn_high),
-        "radius (m)": lambda one: f"{one.radius_m:.3g}",
-        "rolled (deg)": lambda one: f"{one.roll_deg:.0f}",
+        "turn a cycle (°)": lambda one: (
+            interval(one.drawn_turn_deg_per_cycle, one.drawn_turn_low, one.drawn_turn_high)
+            or f"{one.turn_deg_per_cycle:.1f}"
+        ),
+        "radius (m)": lambda one: f"{one.radius_m:.2g}" if not one.radius_m >= 100.0 else "> 100",
+        "rolled (°)": lambda one: f"{one.roll_deg:.0f}",
     }
-    return terminal_table(tabulated(readings, columns), "Turning")
+    caption = "after ±: half of the 95 % interval over eight frictions"
+    return terminal_table(tabulated(readings, columns), "Turning", caption=caption)
 
 
 def turning_picture(readings: Sequence[Reading], tracks: Sequence[Track], stem: Path) -> Path:

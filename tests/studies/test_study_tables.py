@@ -11,19 +11,34 @@ from rich.table import Table
 from annelid_studies import pipes, turning
 
 NAN = float("nan")
+NONE = NAN, NAN, NAN
+SPEEDS, TURNS = (-0.123456, -0.145678, -0.101234), (-12.3456, -14.5678, -10.1234)
 TABLES = {
     "pipes": pipes.pipes_table(
         [
-            pipes.Reading(*trial[:3], passed, 0.0312345, 1.234567, passed, work, slip, "annelid run x")
+            pipes.Reading(*trial[:3], passed, 0.03, *drawn, 0.03, 1.234567, passed, work, slip, "annelid run x")
             for trial in pipes.trials()
-            for passed, work, slip in ((True, 12345.678, 12.3456), (False, None, None))
+            for passed, work, slip, drawn in ((True, 12345.678, 12.3456, SPEEDS), (False, None, None, NONE))
         ]
     ),
     "turning": turning.turning_table(
         [
-            turning.Reading(gait.name, -0.9, wave, 2.6251, 0.0312345, -12.3456, -0.5, radius, -123.4, "annelid run x")
+            turning.Reading(
+                gait.name,
+                -0.9,
+                wave,
+                2.6,
+                0.03,
+                -12.3,
+                *drawn,
+                -12.3,
+                -0.5,
+                radius,
+                -123.4,
+                "annelid run x",
+            )
             for gait in turning.GAITS
-            for wave, radius in ((True, 12345.678), (False, float("inf")), (None, NAN))
+            for wave, radius, drawn in ((True, 12345.678, TURNS), (False, float("inf"), NONE), (None, NAN, NONE))
         ]
     ),
 }

@@ -103,7 +103,7 @@ class Reading:
     drawn_speed_m_per_s: float  # The same, mean over runs with frictions within one percent; NaN without them
     drawn_speed_low: float  # Ends of its 95 % interval
     drawn_speed_high: float
-    half_step_speed_m_per_s: float  # The same at half the step, of the first of those runs
+    half_step_change_m_per_s: float  # What half the step changes of it, in the first of those runs
     front_m: float  # Arc length that the foremost ring came to
     in_order: bool | None  # Whether segments contracted in the order 1-2-..-N throughout
     work_J_per_m: float | None  # Net work of the muscles per metre of the middle's path, over the whole run
@@ -168,7 +168,8 @@ def study(store: Store, output: Path, effort: Effort) -> Results:
     for trial in wanted:
         run = store.run(trial.case)
         drawn, halved = further.get(trial[:3], ([], None))
-        mean, low, high = mean_and_interval([speed(case) for case in drawn])
+        speeds = [speed(case) for case in drawn]
+        mean, low, high = mean_and_interval(speeds)
         passage, found = passage_of(run), store[trial.case].summary
         work_J = found.energy_muscle_work_J
         path_m = float(passage.middle_m[-1] - passage.middle_m[0])
@@ -180,7 +181,7 @@ def study(store: Store, output: Path, effort: Effort) -> Results:
                 drawn_speed_m_per_s=mean,
                 drawn_speed_low=low,
                 drawn_speed_high=high,
-                half_step_speed_m_per_s=nan if halved is None else speed(halved),
+                half_step_change_m_per_s=nan if halved is None else speed(halved) - speeds[0],
                 front_m=float(passage.front_m.max()),
                 in_order=found.wave,
                 work_J_per_m=None if work_J is None or path_m <= 0 else work_J / path_m,

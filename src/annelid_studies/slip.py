@@ -76,7 +76,7 @@ def case(controller: str, friction: float, **changes: Any) -> Case:
 def feedback(store: Store, output: Path, effort: Effort, half_step: bool = False) -> Results:
     """The study `slip`."""
     steps = finer_steps(load_config(PRESET))[0] if half_step else {}
-    draws = DRAWS[effort] // 2 if half_step else DRAWS[effort]
+    draws = max(2, DRAWS[effort] // 2) if half_step else DRAWS[effort]
     cases = {
         (friction, controller): [
             case(controller, friction, **steps, **drawn) for drawn in drawn_frictions(friction, draws)

@@ -131,7 +131,7 @@ class Reading:
     drawn_turn_deg_per_cycle: float  # The same, mean over runs with frictions within one percent; NaN without them
     drawn_turn_low: float  # Ends of its 95 % interval
     drawn_turn_high: float
-    half_step_turn_deg_per_cycle: float  # The same at half the step, of the first of those runs
+    half_step_change_deg_per_cycle: float  # What half the step changes of it, in the first of those runs
     curvature_per_m: float  # Turn over the path
     radius_m: float  # Radius of the circle; infinite for a straight path
     roll_deg: float  # Farthest that the body rolled about its length since the start, positive where its left side rose
@@ -162,7 +162,8 @@ def study(store: Store, output: Path, effort: Effort) -> Results:
         track, cycle_s, turn, turn_deg = read(gait, case)
         found = store[case].summary
         drawn, halved = further.get((gait.name, modulation), ([], None))
-        mean, low, high = mean_and_interval([read(gait, one)[3] for one in drawn])
+        turns = [read(gait, one)[3] for one in drawn]
+        mean, low, high = mean_and_interval(turns)
         readings.append(
             Reading(
                 gait=gait.name,
@@ -174,7 +175,7 @@ def study(store: Store, output: Path, effort: Effort) -> Results:
                 drawn_turn_deg_per_cycle=mean,
                 drawn_turn_low=low,
                 drawn_turn_high=high,
-                half_step_turn_deg_per_cycle=math.nan if halved is None else read(gait, halved)[3],
+                half_step_change_deg_per_cycle=math.nan if halved is None else read(gait, halved)[3] - turns[0],
                 curvature_per_m=turn.curvature_per_m,
                 radius_m=turn.radius_m,
                 roll_deg=math.degrees(track.roll_rad[np.abs(track.roll_rad).argmax()]),

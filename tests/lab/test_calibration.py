@@ -179,6 +179,10 @@ def test_an_experiment_that_is_held_out_is_predicted_from_the_others(tmp_path: P
     study = study_of({"young_modulus": {}, "damping_time": {}}, STRAND, held)
     with pytest.raises(ConfigError, match="unknown experiment 'heay': did you mean 'heavy'"):
         load_identify_study(study).holding_out(["heay"])
+    write(tmp_path / "tube.csv", tube_table(rng))
+    without_strand = load_identify_study(study_of({"softening_strain": {}, "damping_time": {}}, STRAND, TUBE))
+    with pytest.raises(ConfigError, match="softening_strain is only of an experiment that is held out"):
+        identify(without_strand.holding_out(["tube"]), tmp_path)
     found = identify(load_identify_study(study).holding_out(["heavy"]), tmp_path)
     strand, heavy = found.fit.parts
     assert (len(strand.held.at), len(heavy.data.at)) == (0, 0)
@@ -193,12 +197,21 @@ def test_an_experiment_that_is_held_out_is_predicted_from_the_others(tmp_path: P
     ]
     alone = identify(load_identify_study(study_of(study["parameters"], STRAND)), tmp_path)
     assert found.fit.values == pytest.approx(alone.fit.values, rel=1e-6)
-    written = json.loads(write_identified(found, tmp_path)[0].read_text())
-    assert written["experiments"]["heavy"]["held_out"] == n
+    written = json.loads(write_identified(found, tmp_path)[0].read_text())["experiments"]["heavy"]
+    assert (written["held_out"], written["fitted"]) == (n, [])
+    assert len(written["held_out_predicted"]) == len(written["held_out_half_interval"]) == n
     light = identify(
         load_identify_study(study_of(study["parameters"], STRAND, held | {"set": {}})).holding_out(["heavy"]), tmp_path
     )
     assert "points held out lie in their predicted intervals" in light.warnings[-1]
+
+
+def test_the_noise_of_an_experiment_that_is_held_out_is_known_or_that_between_neighbours(tmp_path: Path) -> None:
+    write(tmp_path / "tube.csv", tube_table(np.random.default_rng(4), noise_N=0.5))
+    tube = Tensile.model_validate(TUBE)
+    data = tube.read(tmp_path)
+    assert tube.noise_held_out(data) == pytest.approx(0.5 / sqrt(200 / len(data.at)), rel=0.3)
+    assert Tensile.model_validate(TUBE | {"noise_sd": 0.2}).noise_held_out(data) == pytest.approx(0.2)
 
 
 def test_what_the_data_cannot_tell_apart_is_said(tmp_path: Path) -> None:
@@ -362,6 +375,7 @@ def test_a_defect_is_refused_in_a_sentence(subtests: pytest.Subtests, tmp_path: 
         (whole, {"preset": "riddle2203-rods"}, "did you mean 'riddle2023-rods'"),
         (whole, {"tube": {"inner_diameter_m": 0.01}}, "must be less than outer_diameter_m"),
         (whole, {"tube": {"hold_out": [[0.0, 0.95]]}}, "points to fit"),
+        (whole, {"tube": {"hold_out": [[0.0, 1.0]]}}, "leaves nothing to fit"),
         (whole, {"tube": {"set": {"body.strands.young_modulus_Pa": 1e8}}}, "is fitted by a parameter"),
     )
     for damage, study, says in cases:

@@ -104,6 +104,18 @@ def test_the_last_cycles_of_every_signal_are_held_out() -> None:
     assert set(data.series[walk.held(data)]) == {0, 1, 2}
 
 
+def test_lag_and_clock_of_a_walk_that_is_held_out_are_those_of_its_log(tmp_path: Path) -> None:
+    clock, run_s = np.arange(0.0, 4.0, 0.02), np.arange(0.0, 6.0, 0.02)
+    table = np.column_stack([clock, 80.0 + 20.0 * np.sin(2.0 * (clock + 0.7))])
+    np.savetxt(tmp_path / "walk.csv", table, delimiter=",", header="t_s,s1_mm", comments="")
+    (tmp_path / "map.toml").write_text('time = "t_s"\n[map]\ns1_mm = "stretch_length[1, mean]"')
+    walk = Walk(name="walk", data="walk.csv", map="map.toml", hold_out=((0.0, 1.0),))
+    data = walk.read(tmp_path)
+    assert walk.held(data).all()
+    lag_s, _ = walk.alignment(data, {"time_0": run_s, "value_0": 0.08 + 0.02 * np.sin(2.0 * run_s)})
+    assert lag_s == pytest.approx(0.7, abs=0.005)
+
+
 def test_a_cable_force_counts_as_much_as_a_length(tmp_path: Path) -> None:
     clock = np.arange(0.0, 4.0, 0.02)
     table = np.column_stack([clock, 80.0 + 20.0 * np.sin(clock), 15.0 + 5.0 * np.cos(clock)])

@@ -33,7 +33,7 @@ def reading(**changes: object) -> Reading:
         "drawn_speed_m_per_s": np.nan,
         "drawn_speed_low": np.nan,
         "drawn_speed_high": np.nan,
-        "half_step_speed_m_per_s": np.nan,
+        "half_step_change_m_per_s": np.nan,
         "front_m": 1.2,
         "in_order": True,
         "work_J_per_m": 100.0,

@@ -104,11 +104,11 @@ class Experiment(Kind):
         place = self.place(data)
         held = np.zeros(len(place), dtype=bool)
         for low, high in self.hold_out:
-            held |= (place >= low) & (place < high)
+            held |= (place >= low) & ((place < high) | (high == 1.0))
         if not held.all() and held.sum() > MOST_HELD * len(held):
             raise ConfigError(
                 f"experiments.{self.name}.hold_out leaves {(~held).sum()} of {len(held)} points to fit: hold out at "
-                f"most {MOST_HELD:.0%} of them, or all of the experiment with [[0, 1]]"
+                f"most {100 * MOST_HELD:.0f} % of them, or all of the experiment with [[0, 1]]"
             )
         return held
 
@@ -128,6 +128,13 @@ class Experiment(Kind):
                 f"the data of experiments.{self.name} reach {sizes[0]:.3g} {data.unit}, the worm that the fit starts "
                 f"from {sizes[1]:.3g} {data.unit}: is a unit wrong?"
             )
+
+    def noise_held_out(self, data: Data) -> float:
+        """Standard deviation of a point's noise where no fit estimates it: what is known, or how neighbours scatter."""
+        if (floor := self.noise_floor(data)) is not None:
+            return float(np.sqrt((floor**2).mean()))
+        bends = [np.diff(data.values[data.series == one], 2) for one in np.unique(data.series)]
+        return float(np.sqrt((np.concatenate(bends) ** 2).mean() / 6.0))
 
     def numbers(self, data: Data, found: Found) -> dict[str, float]:
         """Returns further numbers of a fit, by name."""

@@ -8,7 +8,7 @@ points (`noise`) are found in turn, since each needs the other.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import sqrt
@@ -443,21 +443,23 @@ def _fit_of(
 def _errors(fit: Fit) -> list[Noise]:
     """Estimates the errors of every experiment from the residuals at the emulator's optimum.
 
-    One that is held out has those of the first fitted one of its kind, or what is known of its noise.
+    One that is held out has those of the first fitted one of its kind and unit, or no discrepancy, and its own noise.
     """
     prior = fit.prior[1].T @ fit.prior[1]
-    found = []
+    found: dict[str, Noise] = {}
     for part in fit.parts:
         if part.is_fitted:
             known = sum((other.information for other in fit.parts if other is not part), prior)
             rest, stated = part.data.values - part.smooth, part.experiment.noise_sd
-            found.append(estimated(part.data, rest, part.jacobian, known, stated, part.scatter))
-        else:
-            found.append(part.noise)
-    of_kind = {
-        part.experiment.kind: noise for part, noise in reversed([*zip(fit.parts, found, strict=True)]) if part.is_fitted
-    }
-    return [
-        noise if part.is_fitted else of_kind.get(part.experiment.kind, noise)
-        for part, noise in zip(fit.parts, found, strict=True)
-    ]
+            noise = estimated(part.data, rest, part.jacobian, known, stated, part.scatter)
+            found[part.experiment.name] = noise
+    return [found.get(part.experiment.name) or _held_out(fit, part, found) for part in fit.parts]
+
+
+def _held_out(fit: Fit, part: Part, found: Mapping[str, Noise]) -> Noise:
+    own = Noise(part.experiment.noise_held_out(part.held))
+    for other in fit.parts:
+        if other.is_fitted and (other.experiment.kind, other.data.unit) == (part.experiment.kind, part.data.unit):
+            noise = found[other.experiment.name]
+            return noise if part.experiment.noise_sd is None else replace(noise, noise=own.noise)
+    return own

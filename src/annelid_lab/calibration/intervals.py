@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import inf, sqrt
+from math import sqrt
 
 import numpy as np
 
@@ -64,9 +64,12 @@ def intervals(fit: Fit, model: Model) -> Intervals:
 
 
 def _freedom(fit: Fit, part: Part) -> float:
-    """Degrees of freedom of an experiment's errors, less the parameters that it determines; none limit one held out."""
+    """Degrees of freedom of an experiment's errors, less the parameters that it determines.
+
+    Of one that is held out, the fewest of those that are fitted, which its interval rests on.
+    """
     if not part.is_fitted:
-        return inf
+        return min(_freedom(fit, other) for other in fit.parts if other.is_fitted)
     fitted_away = float(np.trace(fit.covariance @ part.information))
     return max(part.noise.freedom(part.data) - fitted_away, FEWEST_FREE)
 

@@ -62,6 +62,16 @@ class Model:
         self.study, self.simulations, self.worm = study, simulations, study.worm(folder)
         self.data = [one.read(folder) for one in study.experiments]
         self.rows = [one.held(data) for one, data in zip(study.experiments, self.data, strict=True)]
+        out = {one.name for one, held in zip(study.experiments, self.rows, strict=True) if held.all()}
+        if len(out) == len(study.experiments):
+            raise ConfigError("hold_out leaves nothing to fit: at least one experiment must be fitted")
+        for name, one in study.parameters.items():
+            paths = [path.split(".") for field in one.fields for path in study.paths(field)]
+            if all(first == "experiments" and own in out for first, own, *_ in paths):
+                raise ConfigError(
+                    f"parameters.{name} is only of an experiment that is held out: leave it out of the study, or name "
+                    "all others with --free"
+                )
         n_fitted = sum(int((~held).sum()) for held in self.rows)
         if n_fitted <= len(study.parameters):
             raise ConfigError(f"{n_fitted} points cannot fit {len(study.parameters)} parameters")

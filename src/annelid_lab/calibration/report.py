@@ -17,7 +17,7 @@ from annelid_lab.calibration.base import shown_in
 from annelid_lab.calibration.doubts import doubts
 from annelid_lab.calibration.figure import identify_figure
 from annelid_lab.calibration.fit import Fit, fitted
-from annelid_lab.calibration.intervals import LEVEL, Intervals, intervals
+from annelid_lab.calibration.intervals import LEVEL, Intervals, band, intervals
 from annelid_lab.calibration.simulations import Simulations
 from annelid_lab.calibration.study import IdentifyStudy
 
@@ -91,6 +91,12 @@ class Identified:
                     "at": part.data.at.tolist(),
                     "measured": part.data.values.tolist(),
                     "fitted": part.fitted.tolist(),
+                    "held_out_at": part.held.at.tolist(),
+                    "held_out_measured": part.held.values.tolist(),
+                    "held_out_predicted": part.held_fitted.tolist(),
+                    "held_out_half_interval": band(
+                        fit, part, part.held, part.held_jacobian, part.held_scatter
+                    ).tolist(),
                     "notes": list(part.data.notes),
                 }
                 for part in fit.parts

@@ -41,7 +41,7 @@ def calibrate_command(
     ] = None,
     hold_out: Annotated[
         list[str] | None,
-        typer.Option(metavar="EXPERIMENT", help="Predict it from the others, and do not fit it; may be repeated."),
+        typer.Option(metavar="EXPERIMENT", help="Predict this experiment from the others; may be repeated."),
     ] = None,
     jobs: Jobs = None,
     example: Annotated[

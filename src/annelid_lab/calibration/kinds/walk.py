@@ -190,7 +190,9 @@ class Walk(Experiment):
             drifts = np.array([float(log_map.clock_drift)])
         ways = [(lag, drift) for drift in drifts for lag in lags]
         free = [axis for axis, values in enumerate((lags, drifts)) if len(values) > 1]
-        kept = ~self.held(data)
+        held = self.held(data)
+        # Of a walk that is held out, lag and clock are still those of its own log.
+        kept = ~held | held.all()
 
         def misfit(way: tuple[float, float]) -> float:
             return float(((self._coarse(data, found, *way) - data.values)[kept] ** 2).sum())

@@ -243,7 +243,7 @@ CAUSES = (
     FRICTION._replace(values=(0.1, 0.2, 0.4, 0.7, 1.0, 1.5, 2.0)),
 )
 """Quantities of the whole worm: what they do is a bound to what the same difference in one segment could do."""
-END_FORCES_N = (12.8, 13.1, 13.4)
+END_FORCES_N = (12.8, 13.1, 13.4, 13.7, 13.8)
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from math import nan, pi
+from math import pi
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 
-from annelid.analysis import Passage, mean_and_interval, passage_of
+from annelid.analysis import Passage, passage_of
 from annelid.draw import canvas, draw_lines, line_looks, panel_title, save_both
 from annelid.experiment import Case, Store
 from annelid.morphology import Array
 from annelid.simulation import Run
-from annelid_studies.standard_cases import Effort, perturbed
+from annelid_studies.standard_cases import NOT_DRAWN, Effort, over_frictions
 from annelid_studies.tables import (
     YES,
     Results,
@@ -153,23 +153,13 @@ def _course(run: Run, passage: Passage) -> Course:
 def study(store: Store, output: Path, effort: Effort) -> Results:
     """The study `pipes`; a run that ended before its second posture is a RunFileError."""
     wanted = trials(effort == "quick")
-    further = {
-        trial[:3]: perturbed(trial.case, CONTACTS["friction"])
-        for trial in wanted
-        if effort == "full" and trial.is_drawn
-    }
     store.compute([trial.case for trial in wanted], "pipes")
-    store.compute([case for drawn, halved in further.values() for case in (*drawn, halved)], "other frictions")
-
-    def speed(case: Case) -> float:
-        return passage_of(store.run(case)).speed_m_per_s()
-
+    drawn = {trial[:3]: trial.case for trial in wanted if effort == "full" and trial.is_drawn}
+    further = over_frictions(store, drawn, lambda _, case: passage_of(store.run(case)).speed_m_per_s())
     readings, courses = [], {}
     for trial in wanted:
         run = store.run(trial.case)
-        drawn, halved = further.get(trial[:3], ([], None))
-        speeds = [speed(case) for case in drawn]
-        mean, low, high = mean_and_interval(speeds)
+        mean, low, high, change = further.get(trial[:3], NOT_DRAWN)
         passage, found = passage_of(run), store[trial.case].summary
         work_J = found.energy_muscle_work_J
         path_m = float(passage.middle_m[-1] - passage.middle_m[0])
@@ -181,7 +171,7 @@ def study(store: Store, output: Path, effort: Effort) -> Results:
                 drawn_speed_m_per_s=mean,
                 drawn_speed_low=low,
                 drawn_speed_high=high,
-                half_step_change_m_per_s=nan if halved is None else speed(halved) - speeds[0],
+                half_step_change_m_per_s=change,
                 front_m=float(passage.front_m.max()),
                 in_order=found.wave,
                 work_J_per_m=None if work_J is None or path_m <= 0 else work_J / path_m,

@@ -39,7 +39,6 @@ STARTS = ("design", "silent", "random")
 PERIOD_TOLERANCE = 0.1
 WAVE = {"kind": "timed", "rise_s": 0.0, "hold_s": DESIGN_INTERVAL_S, "fall_s": 0.0, "interval_s": DESIGN_INTERVAL_S}
 """A wave of the paper's turns: its muscles' rhythm is in time by construction, its segments' lengthening is not."""
-STOPPED = "stopped: "
 N_SEGMENTS = 3
 DESIGN_PERIOD_S = N_SEGMENTS * DESIGN_INTERVAL_S
 
@@ -87,7 +86,8 @@ class Judged:
     young_modulus_Pa: float  # As the worm's
     controller: str  # One of `CONTROLLERS`
     step_s: float  # Physics step
-    reason: str  # What the score says, or why the run ended before its time
+    stopped: bool  # Whether a guard ended the run before its time
+    reason: str  # Why, or what the score says
     period_s: float  # Mean period; NaN if no segment repeats
     walked: bool  # Ordered, in one wave from front to rear, to the end
     in_time: bool  # Walked, with a period within 10 % of design
@@ -136,9 +136,11 @@ def judge(
     period = nan if rhythm.period_s is None else rhythm.period_s
     walked = not message and rhythm.is_one_wave
     in_time = walked and abs(period / DESIGN_PERIOD_S - 1.0) <= PERIOD_TOLERANCE
-    reason = f"{STOPPED}{message}" if message else rhythm.reason
+    stopped, reason = bool(message), message or rhythm.reason
     of = worm.number, worm.noise_m, worm.friction, worm.young_modulus_Pa
-    return Judged(*of, controller, step_s, reason, period, walked, in_time, in_time and lengthening.is_one_wave)
+    return Judged(
+        *of, controller, step_s, stopped, reason, period, walked, in_time, in_time and lengthening.is_one_wave
+    )
 
 
 def study(store: Store, output: Path, effort: Effort) -> Results:
@@ -150,12 +152,14 @@ def study(store: Store, output: Path, effort: Effort) -> Results:
     store.compute(wanted, "robustness")
     store.compute([cases[*key, True] for key in keys if store[cases[*key, False]].message], "again, at half the step")
     judged = []
-    for (worm, controller, _), case in cases.items():
-        if case in store:
-            run = store.run(case)
-            scores = rhythm_score(run, SETTLING_S), lengthening_score(run, SETTLING_S)
-            step_s = case.config.clock.physics_timestep_s
-            judged.append(judge(worm, controller, step_s, *scores, store[case].message))
+    done = {key: case for key, case in cases.items() if case in store}
+    for i, ((worm, controller, _), case) in enumerate(done.items()):
+        if store.progress is not None:
+            store.progress("judging", i, len(done), i / len(done))
+        run = store.run(case)
+        scores = rhythm_score(run, SETTLING_S), lengthening_score(run, SETTLING_S)
+        step_s = case.config.clock.physics_timestep_s
+        judged.append(judge(worm, controller, step_s, *scores, store[case].message))
     found = shares(judged)
     written = (
         write_fields(Share, found, output / "robustness.csv"),
@@ -169,9 +173,9 @@ def shares(judged: Sequence[Judged]) -> list[Share]:
     found = []
     for controller, own in grouped(judged, lambda one: one.controller).items():
         runs = [sorted(of, key=lambda one: -one.step_s) for of in grouped(own, lambda one: one.worm).values()]
-        stopped = [of for of in runs if len(of) > 1 and _was_stopped(of[0])]
-        both = [of for of in runs if len(of) > 1 and not _was_stopped(of[0])]
-        counted = [of[-1] if of in stopped else of[0] for of in runs]
+        stopped = [of for of in runs if len(of) > 1 and of[0].stopped]
+        both = [of for of in runs if len(of) > 1 and not of[0].stopped]
+        counted = [of[-1] if of[0].stopped else of[0] for of in runs]
         good = sum(one.lengthened for one in counted)
         interval = binomtest(good, len(counted)).proportion_ci(method="wilson")
         found.append(
@@ -189,10 +193,6 @@ def shares(judged: Sequence[Judged]) -> list[Share]:
             )
         )
     return found
-
-
-def _was_stopped(one: Judged) -> bool:
-    return one.reason.startswith(STOPPED)
 
 
 def shares_table(found: Sequence[Share]) -> TerminalTable:

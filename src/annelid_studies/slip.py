@@ -32,6 +32,7 @@ TUNED_AT = 0.7
 """Friction at which feedback and timed wave were tuned."""
 FRICTIONS: Mapping[Effort, tuple[float, ...]] = {"full": (0.3, 0.7, 1.0), "quick": (0.7, 1.0)}
 DRAWS: Mapping[Effort, int] = {"full": 8, "quick": 2}
+HALF_STEP_DRAWS = 4
 DURATION_S = 14.0
 """Long enough for four whole cycles behind the first two contractions of segment 1."""
 PLAIN, EXTENSION, PRESSURE, TIMED = "paper's network", "feedback, no pressure", "pressure feedback", "timed wave"
@@ -76,7 +77,7 @@ def case(controller: str, friction: float, **changes: Any) -> Case:
 def feedback(store: Store, output: Path, effort: Effort, half_step: bool = False) -> Results:
     """The study `slip`."""
     steps = finer_steps(load_config(PRESET))[0] if half_step else {}
-    draws = max(2, DRAWS[effort] // 2) if half_step else DRAWS[effort]
+    draws = min(DRAWS[effort], HALF_STEP_DRAWS) if half_step else DRAWS[effort]
     cases = {
         (friction, controller): [
             case(controller, friction, **steps, **drawn) for drawn in drawn_frictions(friction, draws)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, Literal
+from collections.abc import Callable, Mapping
+from math import nan
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 
-from annelid.experiment import Case, finer_steps
+from annelid.analysis import mean_and_interval
+from annelid.experiment import Case, Store, finer_steps
 
 Effort = Literal["quick", "full"]
 """Coarse and within minutes, or the whole."""
@@ -29,6 +31,11 @@ RODS_STEP_S = 0.01
 
 FRICTION_SPREAD = 0.01
 """Largest relative change of the friction in a perturbed run."""
+DRAWS = 8
+"""Perturbed runs from which an interval is computed."""
+NOT_DRAWN = nan, nan, nan, nan
+"""In place of what `over_frictions` finds, for a case that it did not run."""
+K = TypeVar("K")
 
 HOLD_S, REST_S = 0.8, 0.4
 """In the open-loop protocol each segment is held contracted this long, then all rest this long, s."""
@@ -58,10 +65,27 @@ def one_after_the_other(n_segments: int = 3, hold_s: float = HOLD_S, rest_s: flo
     return {"controller": {"kind": "program", "contractions": contractions}, "duration_s": contractions[-1]["stop_s"]}
 
 
-def perturbed(case: Case, friction: float, n: int = 8) -> tuple[list[Case], Case]:
-    """Returns a case with n frictions within `FRICTION_SPREAD` of one, and the first of these at half the step."""
-    drawn = [case.but(changes) for changes in drawn_frictions(friction, n)]
-    return drawn, drawn[0].but(finer_steps(drawn[0].config)[0])
+def over_frictions(
+    store: Store, cases: Mapping[K, Case], value: Callable[[K, Case], float]
+) -> dict[K, tuple[float, float, float, float]]:
+    """Runs cases with `DRAWS` frictions within `FRICTION_SPREAD` of their own, and the first of these at half the step.
+
+    Returns:
+        For each key the mean of a value over the frictions, the ends of its 95 % interval, and what half the step
+        changes of it.
+    """
+    drawn = {}
+    for key, case in cases.items():
+        arena = case.config.arena
+        assert arena is not None
+        drawn[key] = [case.but(changes) for changes in drawn_frictions(arena.friction, DRAWS)]
+    halved = {key: own[0].but(finer_steps(own[0].config)[0]) for key, own in drawn.items()}
+    store.compute([*halved.values(), *(case for own in drawn.values() for case in own)], "other frictions")
+    found = {}
+    for key, own in drawn.items():
+        values = [value(key, case) for case in own]
+        found[key] = (*mean_and_interval(values), value(key, halved[key]) - values[0])
+    return found
 
 
 def drawn_frictions(friction: float, n: int) -> list[dict[str, Any]]:

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from annelid.analysis import Track, mean_and_interval, track_of
+from annelid.analysis import Track, track_of
 from annelid.draw import canvas, draw_lines, line_looks, panel_title, save_both
 from annelid.errors import RunFileError
 from annelid.experiment import Case, Store
-from annelid_studies.standard_cases import Effort, perturbed
+from annelid_studies.standard_cases import NOT_DRAWN, Effort, over_frictions
 from annelid_studies.tables import (
     YES,
     Results,
@@ -31,8 +31,6 @@ COUNTER = (1.0, 1.0, -1.0, -1.0, 1.0, 1.0)
 MODULATIONS = (-0.9, -0.6, -0.3, 0.0, 0.3, 0.6, 0.9)
 DRAWN = (-0.6, 0.6)
 """Modulations that are run with eight frictions as well, and once at half the step."""
-FRICTION = 0.7
-"""Of the presets' floor."""
 LARGEST_RADIUS_M = 20.0
 """Where the axis of the radius ends: a worm that turns more weakly than this goes straight."""
 
@@ -52,6 +50,11 @@ class Turn:
     angle_rad: float
     path_m: float
     curvature_per_m: float
+
+    @property
+    def deg_per_cycle(self) -> float:
+        """Change of the heading in a cycle, degrees."""
+        return math.degrees(self.angle_rad) / self.cycles
 
     @property
     def radius_m(self) -> float:
@@ -142,28 +145,21 @@ def study(store: Store, output: Path, effort: Effort) -> Results:
     """The study `turning`; a run that ended before its second cycle is a RunFileError."""
     modulations = DRAWN if effort == "quick" else MODULATIONS
     cases = [(gait, modulation, gait.case(modulation)) for gait in GAITS for modulation in modulations]
-    further = {
-        (gait.name, modulation): perturbed(case, FRICTION)
-        for gait, modulation, case in cases
-        if effort == "full" and modulation in DRAWN
-    }
     store.compute([case for _, _, case in cases], "turning")
-    store.compute([case for drawn, halved in further.values() for case in (*drawn, halved)], "other frictions")
 
-    def read(gait: Gait, case: Case) -> tuple[Track, float, Turn, float]:
+    def read(gait: Gait, case: Case) -> tuple[Track, float, Turn]:
         track, found = track_of(store.run(case)), store[case].summary
         timed = not case.config.controller.sensor_fields
         cycle_s = gait.cycle_s if timed or found.period_s is None else found.period_s
-        turn = turn_of(track, cycle_s, after_s=cycle_s)
-        return track, cycle_s, turn, math.degrees(turn.angle_rad) / turn.cycles
+        return track, cycle_s, turn_of(track, cycle_s, after_s=cycle_s)
 
+    drawn = {i: case for i, (_, at, case) in enumerate(cases) if effort == "full" and at in DRAWN}
+    further = over_frictions(store, drawn, lambda i, case: read(cases[i][0], case)[2].deg_per_cycle)
     readings, tracks = [], []
-    for gait, modulation, case in cases:
-        track, cycle_s, turn, turn_deg = read(gait, case)
+    for i, (gait, modulation, case) in enumerate(cases):
+        track, cycle_s, turn = read(gait, case)
         found = store[case].summary
-        drawn, halved = further.get((gait.name, modulation), ([], None))
-        turns = [read(gait, one)[3] for one in drawn]
-        mean, low, high = mean_and_interval(turns)
+        mean, low, high, change = further.get(i, NOT_DRAWN)
         readings.append(
             Reading(
                 gait=gait.name,
@@ -171,11 +167,11 @@ def study(store: Store, output: Path, effort: Effort) -> Results:
                 wave=found.wave,
                 cycle_s=cycle_s,
                 speed_m_per_s=turn.path_m / (turn.cycles * cycle_s),
-                turn_deg_per_cycle=turn_deg,
+                turn_deg_per_cycle=turn.deg_per_cycle,
                 drawn_turn_deg_per_cycle=mean,
                 drawn_turn_low=low,
                 drawn_turn_high=high,
-                half_step_change_deg_per_cycle=math.nan if halved is None else read(gait, halved)[3] - turns[0],
+                half_step_change_deg_per_cycle=change,
                 curvature_per_m=turn.curvature_per_m,
                 radius_m=turn.radius_m,
                 roll_deg=math.degrees(track.roll_rad[np.abs(track.roll_rad).argmax()]),
@@ -199,7 +195,7 @@ def turning_table(readings: Sequence[Reading]) -> TerminalTable:
             interval(one.drawn_turn_deg_per_cycle, one.drawn_turn_low, one.drawn_turn_high)
             or f"{one.turn_deg_per_cycle:.1f}"
         ),
-        "radius (m)": lambda one: f"{one.radius_m:.2g}" if not one.radius_m >= 100.0 else "> 100",
+        "radius (m)": lambda one: "> 100" if one.radius_m >= 100.0 else f"{one.radius_m:.2g}",
         "rolled (°)": lambda one: f"{one.roll_deg:.0f}",
     }
     caption = "after ±: half of the 95 % interval over eight frictions"

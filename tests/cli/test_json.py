@@ -170,6 +170,7 @@ def test_a_command_prints_its_result_as_json_and_nothing_else(
     document = strict(done.out)
     assert isinstance(document, list) == (name in LISTS)
     if name in STUDIED:
+        assert document["results"]
         assert all(rows == [{**ROWS[0], "drift": None}] for rows in document["results"].values())
     if name not in {*LISTS, "show", "study limit-cycle"}:
         assert document["files"]

@@ -180,9 +180,9 @@ def test_an_experiment_that_is_held_out_is_predicted_from_the_others(tmp_path: P
     with pytest.raises(ConfigError, match="unknown experiment 'heay': did you mean 'heavy'"):
         load_identify_study(study).holding_out(["heay"])
     write(tmp_path / "tube.csv", tube_table(rng))
-    without_strand = load_identify_study(study_of({"softening_strain": {}, "damping_time": {}}, STRAND, TUBE))
+    of_both = load_identify_study(study_of({"softening_strain": {}, "damping_time": {}}, STRAND, TUBE))
     with pytest.raises(ConfigError, match="softening_strain is only of an experiment that is held out"):
-        identify(without_strand.holding_out(["tube"]), tmp_path)
+        identify(of_both.holding_out(["tube"]), tmp_path)
     found = identify(load_identify_study(study).holding_out(["heavy"]), tmp_path)
     strand, heavy = found.fit.parts
     assert (len(strand.held.at), len(heavy.data.at)) == (0, 0)

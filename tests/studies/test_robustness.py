@@ -77,7 +77,7 @@ def test_verdicts(subtests: pytest.Subtests) -> None:
 def test_a_run_that_a_guard_stopped_did_not_walk_and_says_why() -> None:
     found = judged(0, message="too much energy")
     assert (found.walked, found.in_time, found.lengthened) == (False, False, False)
-    assert found.reason == "stopped: too much energy"
+    assert (found.stopped, found.reason) == (True, "too much energy")
 
 
 def test_a_stopped_worm_counts_as_at_half_the_step_and_others_as_at_their_own() -> None:
@@ -118,9 +118,9 @@ def test_the_study_runs_stopped_worms_again_and_writes_both_tables(
     written, [table] = study.study(Store(tmp_path / "runs"), tmp_path, "full")
     assert [path.name for path in written] == ["robustness.csv", "robustness_runs.csv"]
     counted, rows = (list(csv.DictReader(path.read_text().splitlines())) for path in written)
-    assert [(row["worm"], row["step_s"], row["reason"].startswith("stopped: ")) for row in rows] == [
-        *(("1", "0.01", True), ("1", "0.005", True)),
-        *(("4", "0.01", False), ("4", "0.005", False)),
+    assert [(row["worm"], row["step_s"], row["stopped"]) for row in rows] == [
+        *(("1", "0.01", "True"), ("1", "0.005", "True")),
+        *(("4", "0.01", "False"), ("4", "0.005", "False")),
     ]
     assert [[row[name] for name in ("worms", "stopped", "halved")] for row in counted] == [["2", "1", "1"]]
     assert table.row_count == 1

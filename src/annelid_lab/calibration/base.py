@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import nan, sqrt
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Protocol
 
@@ -23,6 +24,8 @@ FEWEST = 8
 """Points that an experiment must have."""
 MOST_HELD = 0.8
 """Share of the points that may be held out of an experiment that is fitted."""
+NORMAL_MEDIAN = 0.6745
+"""Median of the distance of normal numbers from their mean, in standard deviations."""
 OFF_SCALE = 20.0
 """Data that are so many times as large or as small as the worm's have another unit than their columns say."""
 UNITS = {"Pa": ((1e9, "GPa"), (1e6, "MPa")), "m": ((1e-3, "mm"),)}
@@ -130,11 +133,10 @@ class Experiment(Kind):
             )
 
     def noise_held_out(self, data: Data) -> float:
-        """Standard deviation of a point's noise where no fit estimates it: what is known, or how neighbours scatter."""
+        """Standard deviation of a point's noise where no fit estimates it: known, or that of the noisiest series."""
         if (floor := self.noise_floor(data)) is not None:
             return float(np.sqrt((floor**2).mean()))
-        bends = [np.diff(data.values[data.series == one], 2) for one in np.unique(data.series)]
-        return float(np.sqrt((np.concatenate(bends) ** 2).mean() / 6.0))
+        return max(noise_of_neighbours(data.values[data.series == one]) for one in np.unique(data.series))
 
     def numbers(self, data: Data, found: Found) -> dict[str, float]:
         """Returns further numbers of a fit, by name."""
@@ -147,6 +149,16 @@ class Experiment(Kind):
     def doubts(self, data: Data, found: Found) -> list[str]:
         """Says what is wrong with the data, a sentence each, and what to measure instead."""
         return []
+
+
+def noise_of_neighbours(values: Array) -> float:
+    """Standard deviation of white noise on values in a row, ``(n,)``, from how far each lies from its neighbours' line.
+
+    A value that is not finite, and what lies beside it, does not count; NaN where nothing is left.
+    """
+    bend = np.abs(np.diff(values, 2))
+    bend = bend[np.isfinite(bend)]
+    return float(np.median(bend)) / (NORMAL_MEDIAN * sqrt(6.0)) if len(bend) else nan
 
 
 def file_beside(folder: Path, given: str, what: str) -> Path:

@@ -17,15 +17,13 @@ from pydantic import Field
 from annelid.config import Line, NonNegative, RunConfig
 from annelid.errors import ConfigError
 from annelid.protocols import Array
-from annelid_lab.calibration.base import FEWEST, Data, Experiment, Found, file_beside
+from annelid_lab.calibration.base import FEWEST, Data, Experiment, Found, file_beside, noise_of_neighbours
 from annelid_lab.logs import Measured, read_map, read_measured
 
 ALIKE = 4.0
 """Signals of one unit are compared in it while their standard deviations differ by less; else as shares of these."""
 MOST_DRIFT = 0.05
 """Largest drift of the log's clock that is looked for."""
-NORMAL_MEDIAN = 0.6745
-"""Median of the distance of normal numbers from their mean, in standard deviations."""
 FEWEST_CYCLES = 2.0
 """Cycles that a log should have."""
 GAP = 0.5
@@ -145,9 +143,7 @@ class Walk(Experiment):
             return super().noise_floor(data)
         source, floor = data.source, list[Array]()
         for i, series in enumerate(source.log.values.values()):
-            bend = np.abs(np.diff(series, 2))
-            one = float(np.median(bend[np.isfinite(bend)])) / (NORMAL_MEDIAN * np.sqrt(6.0)) / source.scale[i]
-            floor.append(one / np.sqrt(np.bincount(source.point[i])))
+            floor.append(noise_of_neighbours(series) / source.scale[i] / np.sqrt(np.bincount(source.point[i])))
         return np.concatenate(floor)
 
     def doubts(self, data: Data, found: Found) -> list[str]:

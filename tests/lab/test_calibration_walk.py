@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from annelid.body.worm import WormBody
 from annelid.config import RunConfig
+from annelid_lab.calibration.intervals import intervals
 from annelid_lab.calibration.kinds.walk import Walk, WalkTest
 from annelid_lab.calibration.report import Identified, identify
 from annelid_lab.calibration.simulations import Simulations
@@ -95,6 +97,8 @@ def test_a_walk_that_switches_in_steps_gives_the_truth_and_intervals_that_hold_i
     assert part.numbers["lag_s"] == pytest.approx(0.5, abs=0.005)
     assert found.fit.n_tests < 70
     assert not found.warnings
+    aside = replace(found.fit, logs=found.fit.logs + 0.3)
+    assert (intervals(aside, found.fit.emulator.model).profile[:, 1] >= np.exp(aside.logs)).all(), "a value is inside"
 
 
 def test_the_last_cycles_of_every_signal_are_held_out() -> None:

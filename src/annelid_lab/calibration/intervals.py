@@ -27,7 +27,7 @@ class Intervals:
     """What is known of the parameters, 95 % each.
 
     Attributes:
-        profile: By profile likelihood, ``(p, 2)``.
+        profile: By profile likelihood, and up to the fitted value where that lies outside, ``(p, 2)``.
         relative_error: Standard error of the logarithm of each, ``(p,)``.
         correlation: Of these, ``(p, p)``.
         errors: Relative standard errors of independent combinations of the parameters, greatest first, ``(p,)``.
@@ -52,8 +52,10 @@ def intervals(fit: Fit, model: Model) -> Intervals:
     values, vectors = np.linalg.eigh(fit.information)
     correlation = fit.covariance / np.outer(error, error)
     errors = 1.0 / np.sqrt(np.maximum(values, SINGULAR * max(values[-1], 1.0)))
+    low, high = _profile(fit, model, error, quantile).T
+    fitted = np.exp(fit.logs)
     return Intervals(
-        profile=_profile(fit, model, error, quantile),
+        profile=np.column_stack([np.minimum(low, fitted), np.maximum(fitted, high)]),
         relative_error=error,
         correlation=correlation,
         errors=errors,

@@ -101,7 +101,7 @@ ELSEWHERE = {
     ("annelid", "study", "gallery"): "tests/docs/test_gallery_list.py calls it",
     ("annelid", "export-network", "network.toml"): "tests/cli/test_commands.py exports such a file",
     ("annelid", "loop"): "it needs hardware; tests/lab/loop/test_hardware_loop.py calls it",
-    ("annelid", "study", "paper"): "the command `annelid paper`",
+    ("annelid", "study", "paper"): "an hour: tests/studies/test_paper_command.py",
     ("annelid", "view"): "it opens a browser; the command has tests of its own",
     ("annelid", "run", "my_robot.xml"): "a robot of the reader's own; tests/lab/test_own_robot.py runs some",
     ("annelid", "run", "robot.xml"): "the same",

@@ -86,7 +86,7 @@ class Findings:
 class Examination:
     """A small reproducible study."""
 
-    name: str  # One word, for file names and ``annelid paper --only``
+    name: str  # One word, for file names and ``annelid study paper --only``
     title: str
     question: str
     cases: Callable[[Effort], Sequence[Case]]  # The runs that it needs at an effort

@@ -36,7 +36,7 @@ PAPER = Paper(
     authors="Riddle et al. 2023",
     title="The paper, reproduced and examined",
     heading="The paper's claims",
-    command="annelid paper -o report --claims docs/evidence/paper.md",
+    command="annelid study paper -o report --claims docs/evidence/paper.md",
     leading=(4, 7, 9),  # The model, what it does, and its elongations beside the robot's
 )
 MAIN = Case(CHAIN)

@@ -29,7 +29,7 @@ PAPER = Paper(
     authors="Riddle et al. 2025",
     title="The paper of 2025, examined",
     heading="The claims of the paper of 2025",
-    command="annelid paper riddle2025 --claims docs/evidence/riddle2025.md",
+    command="annelid study paper riddle2025 --claims docs/evidence/riddle2025.md",
     leading=(1,),
 )
 FRAME_DISPLACEMENT_M = 0.326

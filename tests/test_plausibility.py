@@ -50,6 +50,8 @@ DOUBTFUL: list[tuple[str, Changes, str]] = [
     ("riddle2023-rods", {"clock.physics_timestep_s": 0.1}, "clock.physics_timestep_s"),
     ("riddle2023-rods", {"arena.contact_time_constant_s": 0.002}, "arena.contact_time_constant_s"),
     ("riddle2023-rods", {"arena.slope_deg": 20.0, "arena.friction": 0.1}, "arena.slope_deg"),
+    ("riddle2023-fast", {"arena.slope_deg": 5.0}, "body.formulation.friction_impedance_ratio"),
+    ("riddle2023", {"arena.slope_deg": 5.0}, "body.formulation.kind"),
     ("riddle2023-rods", {"sensor.tolerance_m": 0.07}, "sensor.tolerance_m"),
     ("riddle2023-rods", {"sensor.tolerance_m": 0.0005}, "sensor.tolerance_m"),
     ("riddle2023-rods", {"sensor.tolerance_m": 0.2}, "sensor.tolerance_m"),

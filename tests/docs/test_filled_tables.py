@@ -33,12 +33,15 @@ EXCEPTIONS = {
     ("docs/evidence/gait.md", "number"): "definitions, not results",
     ("docs/how_to/install.md", "extra"): "sizes of other packages",
     ("docs/evidence/material.md", "source"): "published values",
-    ("docs/evidence/paper.md", "quantity"): "the whole page is written by `annelid study paper -o report --claims FILE.md`",
+    (
+        "docs/evidence/paper.md",
+        "quantity",
+    ): "`annelid study paper -o report --claims FILE.md` writes the whole page",
     ("docs/evidence/paper.md", "#"): "the same",
     (
         "docs/evidence/riddle2025.md",
         "ground",
-    ): "the whole page is written by `annelid study paper riddle2025 --claims FILE.md`",
+    ): "`annelid study paper riddle2025 --claims FILE.md` writes the whole page",
     ("docs/evidence/riddle2025.md", "quantity"): "the same",
     ("docs/evidence/riddle2025.md", "#"): "the same",
     ("docs/troubleshooting.md", "code"): "exit codes, not results",

@@ -63,6 +63,14 @@ def test_a_worm_at_rest_is_carried_by_its_arena(arena: str) -> None:
     assert total == pytest.approx(weight, abs=0.05 * float(np.linalg.norm(weight)))
 
 
+@pytest.mark.parametrize("made", [load_config("riddle2023-rods-coarse"), load_config(RODS, fidelity="preview")])
+def test_a_worm_at_rest_keeps_to_the_ground_in_steps_of_40_ms(made: RunConfig) -> None:
+    plant = settled(reset(made), 2.0)
+    for _ in range(25):
+        settled(plant, made.clock.physics_timestep_s)
+        assert plant.touch.count.all(), "contacts that are too hard for the step throw it up"
+
+
 @pytest.mark.parametrize("arena", ["pipe.bend", "steps", "setae"])
 def test_a_part_of_the_skin_has_one_contact_at_most(arena: str) -> None:
     plant = settled(reset(config(arena)), 0.6)

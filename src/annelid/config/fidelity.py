@@ -49,7 +49,7 @@ LEVELS = {
     ),
     "fast": Fidelity("rods, two elements a rhombus side, 10 ms; as riddle2023-rods has it"),
     "preview": Fidelity(
-        "rods, two elements a side, 40 ms: edges stretch by up to 2 %, and what rests on a slope creeps by 1 mm/s",
+        "rods, two elements a side, 40 ms: edges stretch by up to 2 %, and what rests on a slope creeps by 3 mm/s",
         {
             "body.formulation.friction_impedance_ratio": 1.0,
             "clock.physics_timestep_s": 0.04,

@@ -41,6 +41,10 @@ def densities_kg_per_m(geometry: MeshGeometry, strands: Strands) -> Array:
 
 BDF2_SHARE = 2.0 / 3.0
 """Length of the engine's step over that of a whole step by BDF2."""
+FIRM_FRICTION = 100.0
+"""Least impedance ratio with which a worm at rest on a slope creeps by less than 1 mm/s (docs/evidence/arenas.md)."""
+CREEPS = "on a slope, what rests slides down by millimetres to centimetres a second"
+"""What a formulation finds where friction yields more."""
 
 
 class Tie(NamedTuple):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 from pydantic import Field
 
 from annelid.body.estimates import rhombus_of, soft_constraint
-from annelid.body.formulations import FormulationKind
+from annelid.body.formulations import CREEPS, FormulationKind
 from annelid.body.mesh import MeshBody
 from annelid.config.answers import Finding
 from annelid.config.run import ArenaKind, RunConfig
@@ -42,7 +42,7 @@ class Chain(FormulationKind):
         return 2e-6 * n_elements**2, 5e-5 * n_elements
 
     def findings(self, config: RunConfig) -> Iterator[Finding]:
-        """Checks the step against the joints', the springs' and the pins' own rates."""
+        """Checks the step against the joints', the springs' and the pins' own rates, and the ground for a slope."""
         body, step = config.body, config.clock.physics_timestep_s
         assert isinstance(body, MeshBody)
         most = _largest_step_s(body, self)
@@ -52,6 +52,8 @@ class Chain(FormulationKind):
             yield Finding("clock.physics_timestep_s", step, problem, instead)
         if self.pin_time_constant_s < 2.0 * step:
             yield soft_constraint("body.formulation.pin_time_constant_s", self.pin_time_constant_s, "pins", step)
+        if config.arena is not None and config.arena.slope_rad:
+            yield Finding("body.formulation.kind", self.kind, CREEPS, "take rods, as riddle2023-rods has them")
 
     def add(
         self, spec: mujoco.MjSpec, geometry: MeshGeometry, body: MeshBody, arena: ArenaKind, *, for_plant: bool

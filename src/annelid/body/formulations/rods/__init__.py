@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 
 from pydantic import Field
 
-from annelid.body.formulations import BDF2_SHARE, FormulationKind, Tie
+from annelid.body.formulations import BDF2_SHARE, CREEPS, FIRM_FRICTION, FormulationKind, Tie
 from annelid.body.mesh import MeshBody
 from annelid.config.answers import Finding
 from annelid.config.run import ArenaKind, RunConfig
@@ -62,12 +62,15 @@ class Rods(FormulationKind):
         return 1e-8 * n_elements**2 * n_helices, 2e-6 * n_elements * n_helices
 
     def findings(self, config: RunConfig) -> Iterator[Finding]:
-        """Checks the step against the edges."""
+        """Checks the step against the edges, and the friction on a slope."""
         step = config.clock.physics_timestep_s
         field, most = "clock.physics_timestep_s", 0.06
         if step > most:
             problem = f"rods were tested in steps up to {most:g} s only, in which their edges stretch by 3 %"
             yield Finding(field, step, problem, f"set at most {most:g}")
+        field, ratio = "body.formulation.friction_impedance_ratio", self.friction_impedance_ratio
+        if ratio < FIRM_FRICTION and config.arena is not None and config.arena.slope_rad:
+            yield Finding(field, ratio, CREEPS, "set 1000")
 
     def add(
         self, spec: mujoco.MjSpec, geometry: MeshGeometry, body: MeshBody, arena: ArenaKind, *, for_plant: bool

@@ -33,10 +33,7 @@ EXCEPTIONS = {
     ("docs/evidence/gait.md", "number"): "definitions, not results",
     ("docs/how_to/install.md", "extra"): "sizes of other packages",
     ("docs/evidence/material.md", "source"): "published values",
-    (
-        "docs/evidence/paper.md",
-        "quantity",
-    ): "`annelid study paper -o report --claims FILE.md` writes the whole page",
+    ("docs/evidence/paper.md", "quantity"): "`annelid study paper --claims FILE.md` writes the whole page",
     ("docs/evidence/paper.md", "#"): "the same",
     (
         "docs/evidence/riddle2025.md",

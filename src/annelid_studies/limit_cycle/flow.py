@@ -20,7 +20,8 @@ Switches = NDArray[np.bool_]
 _TOLERANCE = 1e-11  # Error of a step, as a share of a state and of its scale
 _OF_DERIVATIVES = 1e-8  # The same where the derivatives are taken along, whose rounding is larger
 _PERTURBATION = 1e-7  # Of a state, as a share of its scale, for derivatives
-_LONGEST_STEP_S = 0.02  # So that no switch moves twice within a step
+# So that no switch moves twice within a step, and few steps run over a kink of a piecewise linear synapse.
+_LONGEST_STEP_S = 0.005
 
 
 class Flow(Protocol):

@@ -2,7 +2,7 @@
 
 Each robot is a coarse worm of drawn size, stiffness, damping, friction and tolerance. Its log has three stretch sensors
 with noise, a slow error, gaps, and another zero of time. Stiffness and damping time are fitted.
-Run ``python benchmarks/identify_walks.py RESULTS.csv``; two minutes of two cores for each of 50. It continues where it
+Run ``python benchmarks/identify_walks.py RESULTS.csv``; a minute of two cores for each of 50. It continues where it
 was stopped.
 """
 
@@ -116,7 +116,7 @@ def main(path: Path, walks: int, first: int, jobs: int) -> None:
             with path.open("a", encoding="utf-8", newline="") as file:
                 csv.writer(file, lineterminator="\n").writerows(rows)
             print(f"walk {number} of {walks}", flush=True)
-    columns = ("parameter", "n", "inside", "bias", "half_width")
+    columns = ("parameter", "n", "inside", "bias", "half_width", "error")
     table = write_csv(path.with_stem(f"{path.stem}_table"), columns, summary(path, DRAWN))
     print(table.read_text(encoding="utf-8"))
 

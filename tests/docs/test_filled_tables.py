@@ -61,6 +61,8 @@ NO_WORM = {
     "calibration_default.json": "a fit with a body of its own",
     "identify_recovery.csv": "synthetic robots",
     "identify_recovery_table.csv": "the same",
+    "identify_walks.csv": "the same",
+    "identify_walks_table.csv": "the same",
     "material.csv": "the swept materials are its rows",
 }
 """Result files that are not of presets, and why."""

@@ -33,7 +33,7 @@ BASE = "riddle2023-rods"
 LARGEST_ANGLE_RAD = pi / 6
 """Largest angle by which a strand may turn in one element."""
 MOST_ELEMENTS = 3900
-"""Most elements of all strands: two moving bodies each, and the engine is slow above 8,192."""
+"""Most elements of all strands: two moving bodies each, and plain MuJoCo is slow above 8,192."""
 LEAST_SHAPE, MOST_SHAPE = 1.2, 4.0
 """Turn of a strand along one radius of the axis, rad, within which a length is accepted; the base's is 2.24."""
 MOST_RADIUS_M = 1.0

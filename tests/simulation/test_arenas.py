@@ -148,10 +148,15 @@ def test_several_physics_steps_a_control_step_lay_the_ground_before_each() -> No
     assert np.array_equal(plants[0].data.qpos, plants[1].data.qpos)
 
 
+def crossing_slides(plant: WormPlant) -> np.ndarray:
+    slides = plant.model.jnt_qposadr[plant.model.body_jntadr[plant.anatomy.crossing_body]]
+    return slides[:, None] + np.arange(3)
+
+
 def test_a_worm_that_climbs_is_not_too_high() -> None:
     climbing = config("steps", arena__step_height_m=0.5, arena__step_length_m=1.0, guard__height_m=0.45)
     plant = reset(climbing)
-    plant.data.qpos[0::1][: 3 * plant.geometry.n_crossings].reshape(-1, 3)[:, [0, 2]] += [-1.5, 1.0]
+    plant.data.qpos[crossing_slides(plant)[:, [0, 2]]] += [-1.5, 1.0]
     plant.posture = plant._locate()
     assert plant.posture.crossing[:, 2].max() > 1.3
     plant._control_step = 0
@@ -161,7 +166,7 @@ def test_a_worm_that_climbs_is_not_too_high() -> None:
 def test_a_worm_that_leaves_its_pipe_is_stopped() -> None:
     plant = reset(config("pipe", guard__height_m=0.3))
     assert plant.alarm() is None
-    plant.data.qpos[: 3 * plant.geometry.n_crossings].reshape(-1, 3)[:, 1] += 0.5
+    plant.data.qpos[crossing_slides(plant)[:, 1]] += 0.5
     plant.posture = plant._locate()
     alarm = plant.alarm()
     assert alarm is not None

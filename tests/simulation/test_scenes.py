@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 from annelid import RunConfig, load_config, simulate
-from annelid.body import build_spec
+from annelid.body import build_spec, compile_spec
 from annelid.draw.drawn_worm import DrawnWorm
 from annelid.errors import ConfigError
 from annelid.simulation import Run
@@ -202,7 +202,7 @@ def test_a_picture_is_a_height_field_with_white_high_and_its_first_row_to_the_le
     path = tmp_path / "scene.xml"
     field = '<asset><hfield name="h" file="field.png" size="2 1 0.1 0.1"/></asset>'
     path.write_text(f'<mujoco>{field}<worldbody><geom type="hfield" hfield="h"/></worldbody></mujoco>')
-    model = build_spec(load_config("riddle2023-rods", COARSE, arena=path), for_plant=True).compile()
+    model = compile_spec(build_spec(load_config("riddle2023-rods", COARSE, arena=path), for_plant=True))
     # The engine's rows go from -y to +y, its columns from -x to +x.
     height = model.hfield_data.reshape(3, 4)
     assert height[2, 3] == 1.0

@@ -188,7 +188,7 @@ class TestJudging:
     def test_exponents_over_both_ranges(self) -> None:
         cases = bench_cases("full", ["segments"])
         found = judge(cases, as_measured(cases))["cost_exponents"]
-        assert found[RODS] == pytest.approx({"3-30": 1.0, "12-30": 1.0})
+        assert found[RODS] == pytest.approx({"3-96": 1.0, "12-96": 1.0})
         assert found[CHAIN] == {}
 
     def test_a_failed_case_is_named_with_its_reason(self) -> None:

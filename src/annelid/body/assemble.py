@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -25,6 +26,9 @@ from annelid.errors import ConfigError, shortened
 
 MOST_ORDERED_BODIES = 8192
 """Above this the engine's solver does not order its unknowns (docs/evidence/sparse_ordering.md)."""
+_log = logging.getLogger(__name__)
+# Otherwise the engine prints its warnings and writes them to a file in the user's folder; plants report them.
+mujoco.set_mju_user_warning(lambda message: _log.info("%s", message))
 _SHORT = "lengthen body.mesh.rear_overhang_m and body.mesh.radius_m, or lessen body.mesh.elements_per_side"
 _REMEDIES = {
     "mass and inertia of moving bodies": "a part is too light, so raise body.strands.linear_density_kg_per_m, "
@@ -135,19 +139,14 @@ def compile_spec(spec: mujoco.MjSpec) -> mujoco.MjModel:
         ConfigError: The engine refuses the model.
     """
     try:
-        model = spec.compile()
+        with warnings.catch_warnings():
+            # A plant's model, whose parts are joined so, is not written.
+            warnings.filterwarnings("ignore", "Attaching a spec with an empty prefix")
+            return spec.compile()
     except ValueError as error:
         reason = str(error).splitlines()[0].removeprefix("Error: ")
         remedy = next((f"{remedy} ({reason})" for words, remedy in _REMEDIES.items() if words in reason), reason)
         raise ConfigError(f"the engine refuses this body: {remedy}") from None
-    moving = len({*model.dof_bodyid.tolist()})
-    if model.nflex and moving > MOST_ORDERED_BODIES:
-        warnings.warn(
-            f"the worm has {moving} moving bodies: above {MOST_ORDERED_BODIES} the engine takes fifty times as long "
-            "a step; fewer body.mesh.n_segments or body.mesh.elements_per_side help",
-            stacklevel=2,
-        )
-    return model
 
 
 def mjcf_text(config: RunConfig, keyframes: Sequence[Mapping[str, Any]] = ()) -> str:
@@ -185,7 +184,14 @@ def mjcf_text(config: RunConfig, keyframes: Sequence[Mapping[str, Any]] = ()) ->
     rest = [{"name": "rest", "act": at_rest}] if len(at_rest) else []
     for keyframe in (*rest, *keyframes):
         spec.add_key(**{name: value for name, value in keyframe.items() if np.size(value)})
-    compile_spec(spec)
+    moving = len({*compile_spec(spec).dof_bodyid.tolist()})
+    if spec.flexes and moving > MOST_ORDERED_BODIES:
+        warnings.warn(
+            f"the written worm has {moving} moving bodies: above {MOST_ORDERED_BODIES} the engine takes fifty times as "
+            "long a step; fewer body.mesh.n_segments or body.mesh.elements_per_side help, and annelid's own runs need "
+            "neither",
+            stacklevel=2,
+        )
     if spec.flexes and body.mesh.elements_per_side > 1:
         warnings.warn(
             "a rod in MJCF is equally stiff at every vertex, while annelid bends it as forces at its crossings do. The "

@@ -33,12 +33,12 @@ LEAST_INERTIA_KG_M2 = 2e-15
 """Twice the least that the engine takes."""
 
 
-def add_held_coordinate(spec: mujoco.MjSpec) -> None:
+def add_held_coordinate(spec: mujoco.MjSpec, name: str = HELD) -> None:
     """Adds, once, the coordinate that every row includes."""
-    if spec.body(HELD) is None:
-        held = add_holder(spec, HELD, HELD_MASS_KG, HELD_MASS_KG)
+    if spec.body(name) is None:
+        held = add_holder(spec, name, HELD_MASS_KG, HELD_MASS_KG)
         held.gravcomp = 1.0
-        held.add_joint(name=HELD, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[1.0, 0.0, 0.0])
+        held.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[1.0, 0.0, 0.0])
 
 
 def add_holder(spec: mujoco.MjSpec, name: str, mass_kg: float, inertia_kg_m2: float) -> mujoco.MjsBody:

@@ -200,7 +200,7 @@ class Skeleton:
 
     def locate(self, qpos: NDArray[np.floating]) -> tuple[Array, Array]:
         """Returns the curves of the strands, m, as `strand_curves`, and the crossings, ``(n_crossings, 3)``."""
-        self.data.qpos[:] = qpos
+        self.data.qpos[:] = self.anatomy.own(qpos)
         crossing, *_ = self.anatomy.locate(self.data)
         return self._strands.curves(self.data)[0], crossing
 

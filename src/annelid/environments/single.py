@@ -200,7 +200,7 @@ class WormEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             return None
         if not self._scenes:
             self._scenes.append(PostureScene(self.task.config, *self._view))
-        return self._scenes[0].picture(self.worm.qpos, self._activation, f"{self.sensation.time_s:.2f} s")
+        return self._scenes[0].picture(self.worm.coordinates, self._activation, f"{self.sensation.time_s:.2f} s")
 
     def close(self) -> None:
         """Frees what drew the pictures."""

@@ -98,7 +98,8 @@ def write_mjcf(run: Run, path: Path) -> Path:
         plant = WormPlant(run.config)
         try:
             plant.set_state(read_checkpoint(run.path).plant)
-            parts = {name: np.array(getattr(plant.data, name)) for name in ("qpos", "qvel", "act", "ctrl")}
+            parts = {name: plant.anatomy.written(getattr(plant.data, name)) for name in ("qpos", "qvel")}
+            parts |= {name: np.array(getattr(plant.data, name)) for name in ("act", "ctrl")}
             keyframes.append({"name": "final", "time": float(plant.data.time), **parts})
         except RunFileError:
             if run.data.sizes.get("frame"):

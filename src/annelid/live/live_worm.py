@@ -114,7 +114,7 @@ class LiveWorm:
 def _posture(body: BodyKind, plant: Plant) -> Array:
     """Where a body is now, as a `Moment` has it."""
     if isinstance(plant, WormPlant):
-        return plant.qpos
+        return plant.coordinates
     assert isinstance(plant, Records)
     if body.own_model is not None:
         return np.asarray(plant.read(True)["qpos"])

@@ -13,6 +13,7 @@ from annelid.arena.geoms import skin_geoms
 from annelid.arena.ground import surface_of
 from annelid.arena.surface import Surface
 from annelid.body.actuation import crossing_site, ring_names, stretch_sensors
+from annelid.body.formulations import WRITTEN
 from annelid.body.worm import WormBody
 from annelid.config import ArenaKind
 from annelid.morphology import Array, MeshGeometry, norm
@@ -97,6 +98,7 @@ class Anatomy:
         if model.nflex:
             slide = model.body_dofadr[self.crossing_body][:, np.newaxis] + np.arange(3)
             self._crossing_dof = slide.astype(np.intp)
+        self._written: NDArray[np.intp] = _written_order(model)
         self.ring_path = np.stack([self._path_of(model.tendon(name).id) for name in self.muscle_names])
         mass = np.where(in_scene(model), 0.0, model.body_mass)
         self.total_mass_kg = float(mass.sum())
@@ -125,6 +127,16 @@ class Anatomy:
         self._contact_slice = slice(first, first + 3 * len(sensors))
         self._segment_rows = np.eye(geometry.n_segments)[:, nearest]
         self.skin = Skin(rest, nearest, geometry.n_segments, geometry.radius_m, surface)
+
+    def written(self, values: Array) -> Array:
+        """Returns positions, ``(nq,)``, or velocities, ``(nv,)``, in the order that a written model has."""
+        return np.concatenate([values[self._written], values[len(self._written) :]])
+
+    def own(self, values: NDArray[np.floating]) -> Array:
+        """Returns what is in the order of a written model in that of this one."""
+        ordered = np.array(values, dtype=float)
+        ordered[self._written] = values[: len(self._written)]
+        return ordered
 
     def locate(self, data: mujoco.MjData) -> tuple[Array, Array, Array, Array]:
         """Brings the engine's positions up to its coordinates, which is not part of a step.
@@ -169,6 +181,15 @@ class Anatomy:
         """
         by_geom = data.sensordata[self._contact_slice].reshape(-1, 3).copy()
         return self._segment_rows @ by_geom, by_geom
+
+
+def _written_order(model: mujoco.MjModel) -> NDArray[np.intp]:
+    """The coordinates of the worm's own bodies in the order of a written model, where a plant's has another."""
+    if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, WRITTEN) < 0:
+        return np.empty(0, dtype=np.intp)
+    bodies = 1 + model.numeric(WRITTEN).data.astype(np.intp)
+    starts, counts = model.jnt_qposadr[model.body_jntadr[bodies]], model.body_jntnum[bodies]
+    return np.concatenate([start + np.arange(count) for start, count in zip(starts, counts, strict=True)])
 
 
 def _unit(vectors: Array) -> Array:

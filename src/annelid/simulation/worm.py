@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from operator import attrgetter
 from typing import Any, cast
 
@@ -33,9 +32,6 @@ STATE_PARTS = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 """All that the engine's next step depends on: positions, velocities, activations, warm start."""
 MOST_GAP_M = 0.15
 """Gap at a pin at which a run is stopped; soft crossings part by up to 4 cm in a healthy one."""
-_log = logging.getLogger(__name__)
-# Otherwise the engine prints its warnings and writes them to a file in the user's folder; `alarm` reports them.
-mujoco.set_mju_user_warning(lambda message: _log.info("%s", message))
 ENGINE_WARNINGS = {
     mujoco.mjtWarning.mjWARN_INERTIA: "the engine's implicit solve did not converge",
     mujoco.mjtWarning.mjWARN_CONTACTFULL: "the engine ran out of room for contacts",
@@ -86,7 +82,7 @@ _SIGNALS = {
 """What is recorded: where a worm has it, its dimensions, its unit and what it is."""
 _FRAME_SIGNALS = {
     "crossing_position": ("posture.crossing", ("crossing", "axis"), "m", "position of a crossing"),
-    "qpos": ("qpos", ("coordinate",), "1", "generalised position"),
+    "qpos": ("coordinates", ("coordinate",), "1", "generalised position"),
 }
 
 
@@ -162,6 +158,11 @@ class WormPlant:
         self.mechanics = body.formulation.mechanics(self.model, data, body, arena, self._step_s)
         self.ground = MovingGround(self.model, self.geometry, arena) if arena.has_moving_planes else None
         self.reset(0)
+
+    @property
+    def coordinates(self) -> Array:
+        """The engine's positions, ``(nq,)``, in the order that a written model has."""
+        return self.anatomy.written(self.qpos)
 
     @property
     def _time_s(self) -> float:

@@ -32,7 +32,7 @@ SCHEMA = "schema.toml"
 QUANTITIES = ("elongation", "period", "travel", "work", "slip")
 """What a run is judged by."""
 
-SCALED_SEGMENTS = (12, 30)
+SCALED_SEGMENTS = (12, 96)
 """Beside the whole range of segments, the exponent of the cost is taken over this one."""
 
 MEASURING = "annelid_studies.bench.measure"
@@ -41,7 +41,7 @@ MEASURING = "annelid_studies.bench.measure"
 # Importing, compiling, and the pass with the engine's timers.
 _OVERHEAD_S = 5.0
 # Exponents by which the cost of a step grows with the number of segments, beyond proportion.
-_CHAIN_GROWTH, _ROD_GROWTH = 2.0, 0.4
+_CHAIN_GROWTH, _ROD_GROWTH = 2.0, 0.5
 
 
 @locks("folder")

@@ -114,7 +114,7 @@ def bench_command(
     \b
     --cases levels    levels of --fidelity, and three presets
     --cases steps     physics steps of 1 to 40 ms
-    --cases segments  rods of 3 to 30 segments
+    --cases segments  rods of 3 to 96 segments
     --cases chain     the paper's formulation, 3 to 12 segments
     --cases duration  10 and 60 s, for the memory
 

@@ -47,6 +47,10 @@ CREEPS = "on a slope, what rests slides down by millimetres to centimetres a sec
 """What a formulation finds where friction yields more."""
 
 
+WRITTEN = "written_order"
+"""Name, in the model of a plant, of its own number of each body, in the order that written models have."""
+
+
 class Tie(NamedTuple):
     """A spring and a dashpot between a pin and a vertex of each of its strands."""
 

@@ -5,14 +5,17 @@ no constraint and cannot part. Each strand is a 1D flex through its vertices' bo
 bending and torsion, kept inextensible by edge constraints. A rod's twist needs one hinge per edge, found by its
 name; without the hinges the model compiles and is far too floppy.
 
-A plant has rows for bending and twist in place of the engine's (`annelid.body.formulations.rods.strains`). Separate
-pins are point masses tied to a vertex of each strand by springs and dashpots (`annelid.body.constraint_rows`).
+A plant has rows for bending and twist in place of the engine's (`annelid.body.formulations.rods.strains`), and its
+bodies in the order that makes its steps cheap (`annelid.body.formulations.rods.elimination`). Separate pins are point
+masses tied to a vertex of each strand by springs and dashpots (`annelid.body.constraint_rows`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
+from functools import partial
+from itertools import groupby
+from operator import itemgetter
 from typing import Any
 
 import mujoco
@@ -20,8 +23,9 @@ import numpy as np
 
 from annelid.arena.friction import contact_options
 from annelid.body.actuation import crossing_site, mark_crossing
-from annelid.body.constraint_rows import LEAST_INERTIA_KG_M2, add_held_coordinate, add_holder, add_tie
-from annelid.body.formulations import Tie, densities_kg_per_m
+from annelid.body.constraint_rows import HELD, LEAST_INERTIA_KG_M2, add_held_coordinate, add_holder, add_tie
+from annelid.body.formulations import WRITTEN, Tie, densities_kg_per_m
+from annelid.body.formulations.rods.elimination import elimination_order
 from annelid.body.formulations.rods.strains import add_strains, net_stiffness, twist_name
 from annelid.body.mesh import MeshBody, Strands
 from annelid.config import ArenaKind
@@ -33,6 +37,11 @@ ORIGIN = np.zeros(3)
 STRAND_RGBA = ((0.12, 0.35, 0.75, 1.0), (0.25, 0.5, 0.85, 1.0))
 EDGE_IMPEDANCE = [0.99, 0.999, 0.001, 0.5, 2.0]
 HIDDEN_GROUP = 4
+BODIES_IN_PART = 200
+ARENA_BYTES, ARENA_BYTES_A_BODY, ARENA_BYTES_A_PAIR = 256_000_000, 20_000, 6
+"""Memory for one step: at least twice of what 3 to 96 segments use, and over a hundred times of it for three."""
+Maker = Callable[[mujoco.MjSpec, str], object]
+"""Adds one body of a name to the world."""
 SOLVER_ITERATIONS, SOLVER_TOLERANCE = 300, 1e-6
 """At 1e-4 what is pulled and held creeps by a percent; 1e-12 is the same as 1e-6 within 0.1 %."""
 TWIST_MASS_KG = 1e-9
@@ -65,67 +74,88 @@ def add_rods(
     # The net is one island; looking for others takes 3 % of a step.
     spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ISLAND)
     density = densities_kg_per_m(geometry, body.strands)
-    names = _add_vertices(spec, geometry, body, arena, tie, density)
+    bodies, names = _vertices(geometry, body, arena, tie, density)
+    bodies[HELD] = add_held_coordinate
+    hinges = [twist_names(f"strand_{strand}", density) for strand in range(geometry.n_strands)]
+    for vertices_m, names_of_hinges in zip(geometry.vertices_m, hinges, strict=True):
+        bodies |= _twist_bodies(names_of_hinges, vertices_m, body.strands, density)
+    if for_plant:
+        order = elimination_order([*bodies], geometry, names, hinges)
+        number = {name: i for i, name in enumerate(order)}
+        # The engine would take up to a hundred times what it uses, 15 GB for 48 segments.
+        spec.memory = ARENA_BYTES + ARENA_BYTES_A_BODY * len(order) + ARENA_BYTES_A_PAIR * len(order) ** 2
+        spec.add_numeric(name=WRITTEN, size=len(order), data=[number[name] for name in bodies])
+        for first in range(0, len(order), BODIES_IN_PART):
+            _add_part(spec, bodies, order[first : first + BODIES_IN_PART], "")
+    else:
+        for letter, alike in groupby(bodies, itemgetter(0)):
+            _add_part(spec, bodies, [*alike], letter)
+    if tie is not None:
+        for crossing, strands in enumerate(geometry.crossing_strands):
+            vertex = geometry.crossing_vertex[geometry.crossing_plane[crossing]]
+            for strand in strands:
+                add_tie(spec, crossing_site(crossing), names[strand][vertex], tie)
     material = body.strands.of_segment(0)
     stiffness = net_stiffness(geometry, body.strands)
-    for strand, (vertices_m, bodies) in enumerate(zip(geometry.vertices_m, names, strict=True)):
+    for strand, (vertices_m, points) in enumerate(zip(geometry.vertices_m, names, strict=True)):
         rgba = STRAND_RGBA[strand // geometry.n_per_plane]
         rows = stiffness[:, strand] if for_plant else None
         options = {"rgba": rgba, "density_kg_per_m": density, "stiffness_Nm": rows}
-        add_rod(spec, f"strand_{strand}", vertices_m, bodies, material, edge_time_constant_s, **options)
+        add_rod(spec, f"strand_{strand}", vertices_m, points, material, edge_time_constant_s, **options)
 
 
-def _add_vertices(
-    spec: mujoco.MjSpec,
-    geometry: MeshGeometry,
-    body: MeshBody,
-    arena: ArenaKind,
-    tie: Tie | None,
-    density_kg_per_m: Array,
-) -> list[list[str]]:
-    """Adds a body for every vertex, crossings first (which the solver is fastest with); returns each strand's names."""
+def _vertices(
+    geometry: MeshGeometry, body: MeshBody, arena: ArenaKind, tie: Tie | None, density_kg_per_m: Array
+) -> tuple[dict[str, Maker], list[list[str]]]:
+    """Returns what adds the body of every vertex, by its name, crossings first, and the names along each strand."""
     n, contact = geometry.n_segments, contact_options(arena)
     masses = lumped_masses(geometry.vertices_m[0], density_kg_per_m).tolist()
     pins_kg = geometry.along(body.pins.of_each("mass_kg", n), geometry.plane_x_m)
     names = [[vertex_name(s, v) for v in range(len(masses))] for s in range(geometry.n_strands)]
-    for crossing in range(geometry.n_crossings):
-        name, vertex = crossing_site(crossing), geometry.crossing_vertex[geometry.crossing_plane[crossing]]
-        place, strands = geometry.crossings_m[crossing], geometry.crossing_strands[crossing]
-        pin_kg = float(pins_kg[geometry.crossing_plane[crossing]])
-        pin = add_vertex(spec, name, place, pin_kg + (2 * masses[vertex] if tie is None else 0.0))
+    found: dict[str, Maker] = {}
+
+    def add_point(spec: mujoco.MjSpec, name: str, place: Array, mass_kg: float) -> None:
+        add_touch(add_vertex(spec, name, place, mass_kg), body.strands.radius_m, contact)
+
+    def add_crossing(spec: mujoco.MjSpec, name: str, place: Array, mass_kg: float) -> None:
+        pin = add_vertex(spec, name, place, mass_kg)
         mark_crossing(pin, name, body.pins.radius_m, 0.0)
         if tie is None:
             add_touch(pin, body.strands.radius_m, contact)
-            for strand in strands:
-                names[strand][vertex] = name
-            continue
-        for strand in strands:
-            point = add_vertex(spec, names[strand][vertex], place, masses[vertex])
-            add_touch(point, body.strands.radius_m, contact)
-            add_tie(spec, name, point.name, tie)
 
+    for crossing in range(geometry.n_crossings):
+        name, vertex = crossing_site(crossing), int(geometry.crossing_vertex[geometry.crossing_plane[crossing]])
+        place = geometry.crossings_m[crossing]
+        pin_kg = float(pins_kg[geometry.crossing_plane[crossing]])
+        mass_kg = pin_kg + (2 * masses[vertex] if tie is None else 0.0)
+        found[name] = partial(add_crossing, place=place, mass_kg=mass_kg)
+        for strand in geometry.crossing_strands[crossing].tolist():
+            if tie is None:
+                names[strand][vertex] = name
+            else:
+                found[vertex_name(strand, vertex)] = partial(add_point, place=place, mass_kg=masses[vertex])
     between = sorted({*range(len(masses))} - {*geometry.crossing_vertex.tolist()})
     for strand in range(geometry.n_strands):
-        with _built_apart(spec, vertex_name(strand, "")) as part:
-            for vertex in between:
-                point = add_vertex(part, str(vertex), geometry.vertices_m[strand, vertex], masses[vertex])
-                add_touch(point, body.strands.radius_m, contact)
-    return names
+        for vertex in between:
+            place = geometry.vertices_m[strand, vertex]
+            found[vertex_name(strand, vertex)] = partial(add_point, place=place, mass_kg=masses[vertex])
+    return found, names
 
 
-@contextmanager
-def _built_apart(spec: mujoco.MjSpec, prefix: str) -> Iterator[mujoco.MjSpec]:
-    """Yields a spec of its own for some bodies of the world, whose names get the prefix as they join.
+def _add_part(spec: mujoco.MjSpec, bodies: dict[str, Maker], names: list[str], prefix: str) -> None:
+    """Adds bodies to the world, built in a spec of their own.
 
     The engine walks the whole tree at every element that is added to it: 12 s for the bodies of 48 segments, and a
-    tenth of it in parts.
+    tenth of it in parts. It says that a model whose names are joined without a prefix, as a plant's, cannot be written.
     """
     part = mujoco.MjSpec()
     part.compiler.degree = spec.compiler.degree
-    yield part
+    for name in names:
+        bodies[name](part, name.removeprefix(prefix))
     spec.attach(part, prefix=prefix, frame=spec.worldbody.add_frame())
-    # Each part brings an empty class of defaults, which would only fill the written MJCF.
-    spec.delete(spec.find_default(f"{prefix}main"))
+    if prefix:
+        # Each part brings an empty class of defaults, which would only fill the written MJCF.
+        spec.delete(spec.find_default(f"{prefix}main"))
 
 
 def vertex_name(strand: int, vertex: int | str) -> str:
@@ -185,8 +215,7 @@ def add_rod(
         stiffness_Nm: Of the rows that resist bending and twist, ``(3, n_edges - 1)``, for a plant that renews them
             (`RodStrains`); None for the engine's own elasticity, one for the whole rod.
     """
-    lengths = np.linalg.norm(np.diff(vertices_m, axis=0), axis=1)
-    n_edges = len(lengths)
+    n_edges = len(vertices_m) - 1
     if density_kg_per_m is None:
         density_kg_per_m = np.full(n_edges, strands.one_number("linear_density_kg_per_m"))
     flex = spec.add_flex(
@@ -205,17 +234,10 @@ def add_rod(
     add_held_coordinate(spec)
     flex.vertbody = bodies
     flex.elem = np.stack([np.arange(n_edges), np.arange(1, n_edges + 1)], axis=-1).ravel().tolist()
-    with _built_apart(spec, f"{name}_") as part:
-        for edge in range(n_edges):
-            hinge = twist_name(name, edge, n_edges).removeprefix(f"{name}_")
-            inertia = 0.5 * density_kg_per_m[edge] * lengths[edge] * strands.radius_m**2
-            if (raised := LEAST_INERTIA_KG_M2 / inertia) > MOST_RAISED:
-                raise ConfigError(
-                    f"body.strands.radius_m = {strands.radius_m:.3g}: this worm is too small for the engine's numbers; "
-                    f"one of its shape must be at least {1.01 * (raised / MOST_RAISED) ** 0.2:.3g} times as large"
-                )
-            holder = add_holder(part, hinge, TWIST_MASS_KG, inertia)
-            holder.add_joint(name=hinge, type=mujoco.mjtJoint.mjJNT_HINGE, axis=AXES[0])
+    hinges = _twist_bodies(twist_names(name, density_kg_per_m), vertices_m, strands, density_kg_per_m)
+    for hinge, add in hinges.items():
+        if spec.body(hinge) is None:
+            add(spec, hinge)
     spec.add_equality(
         name=name,
         type=mujoco.mjtEq.mjEQ_FLEX,
@@ -226,6 +248,32 @@ def add_rod(
     )
     if stiffness_Nm is not None:
         add_strains(spec, name, bodies, stiffness_Nm, strands.damping_time_s)
+
+
+def twist_names(rod: str, edges: Sequence[Any] | Array) -> list[str]:
+    """Names of the twist hinges of a rod, one for each of its edges."""
+    return [twist_name(rod, edge, len(edges)) for edge in range(len(edges))]
+
+
+def _twist_bodies(names: list[str], vertices_m: Array, strands: Strands, density_kg_per_m: Array) -> dict[str, Maker]:
+    """Returns what adds the bodies of the twist hinges of a rod's edges, by their names; arguments as `add_rod`.
+
+    Raises:
+        ConfigError: An edge is too light for the engine.
+    """
+    lengths = np.linalg.norm(np.diff(vertices_m, axis=0), axis=1)
+    inertias = 0.5 * density_kg_per_m * lengths * strands.radius_m**2
+    if (raised := LEAST_INERTIA_KG_M2 / float(inertias.min())) > MOST_RAISED:
+        raise ConfigError(
+            f"body.strands.radius_m = {strands.radius_m:.3g}: this worm is too small for the engine's numbers; "
+            f"one of its shape must be at least {1.01 * (raised / MOST_RAISED) ** 0.2:.3g} times as large"
+        )
+
+    def add(spec: mujoco.MjSpec, name: str, inertia: float) -> None:
+        holder = add_holder(spec, name, TWIST_MASS_KG, inertia)
+        holder.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=AXES[0])
+
+    return {name: partial(add, inertia=inertia) for name, inertia in zip(names, inertias.tolist(), strict=True)}
 
 
 def lumped_masses(vertices_m: Array, linear_density_kg_per_m: float | Array) -> Array:

@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from annelid.body import build_spec, compile_spec, crossing_site
+from annelid.body.constraint_rows import HELD
 from annelid.body.formulations.rods import elimination, net
 from annelid.body.formulations.rods.elimination import nested_dissection
 from annelid.config import load_config
@@ -95,6 +96,8 @@ def test_a_worm_moves_the_same_in_any_order(pins: str, monkeypatch: pytest.Monke
     assert np.ptp(ours.observe().ring_length_m) > 0.1, "it must have moved"
     # A model that is no plant's is where the plant is in the coordinates that a run records.
     model = compile_spec(build_spec(ours._config))
+    # So have the run files of older versions.
+    assert model.body(HELD).id == (3 if pins == "separate" else model.body("strand_0_twist_0").id - 1)
     data = mujoco.MjData(model)
     data.qpos[:] = ours.coordinates
     mujoco.mj_kinematics(model, data)

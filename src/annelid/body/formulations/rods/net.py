@@ -75,7 +75,7 @@ def add_rods(
     spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ISLAND)
     density = densities_kg_per_m(geometry, body.strands)
     bodies, names = _vertices(geometry, body, arena, tie, density)
-    bodies[HELD] = add_held_coordinate
+    bodies.setdefault(HELD, add_held_coordinate)
     hinges = [twist_names(f"strand_{strand}", density) for strand in range(geometry.n_strands)]
     for vertices_m, names_of_hinges in zip(geometry.vertices_m, hinges, strict=True):
         bodies |= _twist_bodies(names_of_hinges, vertices_m, body.strands, density)
@@ -134,6 +134,8 @@ def _vertices(
                 names[strand][vertex] = name
             else:
                 found[vertex_name(strand, vertex)] = partial(add_point, place=place, mass_kg=masses[vertex])
+                # Where run files of older versions have it.
+                found.setdefault(HELD, add_held_coordinate)
     between = sorted({*range(len(masses))} - {*geometry.crossing_vertex.tolist()})
     for strand in range(geometry.n_strands):
         for vertex in between:

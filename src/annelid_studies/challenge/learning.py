@@ -48,7 +48,7 @@ EVALUATED = 0
 """Training seed of the draws on which every piece's network is judged."""
 INTERVAL_S = {"three": 0.08, "six": 0.12}
 TRAINED_ON: Mapping[str, tuple[str, str | None]] = {
-    "three": ("riddle2023-rods", None),
+    "three": ("riddle2023-rods-coarse", None),
     "six": ("riddle2025", "coarse"),
 }
 """Preset and level that stand for each of the bodies of the benchmark in training."""

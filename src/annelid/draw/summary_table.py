@@ -190,7 +190,8 @@ def duration_for_a_speed(numbers: Summary) -> int | None:
     onsets_s = numbers.onsets_s
     if numbers.speed_m_per_s is not None or numbers.travel_m is None or len(onsets_s) < 2:
         return None
-    if numbers.rhythm_verdict == "silent":
+    # A run that was interrupted goes on to its own end first.
+    if numbers.rhythm_verdict == "silent" or numbers.status != "complete":
         return None
     period_s = numbers.period_s or numbers.n_segments * (onsets_s[-1] - onsets_s[0]) / (len(onsets_s) - 1)
     duration_s = ceil(onsets_s[0] + _CYCLES_FOR_A_SPEED * period_s)

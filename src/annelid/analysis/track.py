@@ -149,7 +149,7 @@ def nearest_time(run: Run, times_s: Array, time_s: float) -> int:
     Raises:
         RunFileError: The run has no such time.
     """
-    margin = float(np.diff(times_s).max()) if len(times_s) > 1 else 0.0
+    margin = float(np.diff(times_s).max()) if len(times_s) > 1 else run.config.record.frames_interval_s
     if not times_s[0] - margin <= time_s <= times_s[-1] + margin:
         raise RunFileError(
             f"{run.path} has no picture at {time_s:g} s: it was recorded from {times_s[0]:g} to {times_s[-1]:g} s"

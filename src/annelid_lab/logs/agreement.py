@@ -19,6 +19,8 @@ from annelid.protocols import Array
 from annelid.simulation import Run
 from annelid_lab.logs.measured import Measured
 
+FEWEST_SHARED = 20
+"""Samples that log and run have at least in common."""
 LEAST_OVERLAP = 0.5
 """Share of the shorter of both records that must overlap."""
 LONGEST_GAP_SAMPLES = 3.0
@@ -159,8 +161,11 @@ def compare_series(series: Mapping[str, tuple[Array, Array, str]], log: Measured
     theirs = _resampled(log, drift, step_s, (lag - exact) * step_s)
     overlap = slice(max(lag, 0), min(lag + theirs.shape[1], ours.shape[1]))
     of_log = slice(overlap.start - lag, overlap.stop - lag)
-    if overlap.stop - overlap.start < 20:
-        raise ConfigError(f"log and run do not overlap at lag_s = {shown(log.log_map.lag_s)}")
+    if (shared := max(0, overlap.stop - overlap.start)) < FEWEST_SHARED:
+        raise ConfigError(
+            f"log and run have {shared} samples of {step_s:.3g} s in common at lag_s = {shown(log.log_map.lag_s)}, and "
+            f"at least {FEWEST_SHARED} are compared: let the run be longer, or change lag_s"
+        )
     measured, simulated_here, time_s = theirs[:, of_log].copy(), ours[:, overlap], grid[overlap]
     for row, (name, column) in enumerate(log.columns.items()):
         seen = np.isfinite(measured[row])

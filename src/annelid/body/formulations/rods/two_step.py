@@ -112,10 +112,7 @@ class TwoStep:
             RunFileError: An older version of annelid returned it, whose coordinates had another order.
         """
         if "qpos_before" in state:
-            raise RunFileError(
-                "the run cannot be continued: an older version of annelid wrote it, which ordered the coordinates of "
-                "rods otherwise; run it anew"
-            )
+            raise RunFileError("an older version of annelid wrote it, which ordered the coordinates of rods otherwise")
         self._qpos_before = np.array(state["position_before"], dtype=float)
         self._qvel_before = np.array(state["velocity_before"], dtype=float)
         self._strains.restore(self._data.qpos, np.asarray(state["director"], dtype=float))

@@ -188,8 +188,8 @@ def mjcf_text(config: RunConfig, keyframes: Sequence[Mapping[str, Any]] = ()) ->
     if spec.flexes and moving > MOST_ORDERED_BODIES:
         warnings.warn(
             f"the written worm has {moving} moving bodies: above {MOST_ORDERED_BODIES} plain MuJoCo takes tens of "
-            "times as long a step. Fewer body.mesh.n_segments or body.mesh.elements_per_side help; annelid's own runs need "
-            "neither",
+            "times as long a step. Fewer body.mesh.n_segments or body.mesh.elements_per_side help; annelid's own runs "
+            "need neither",
             stacklevel=2,
         )
     if spec.flexes and body.mesh.elements_per_side > 1:

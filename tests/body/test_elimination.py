@@ -15,6 +15,7 @@ from annelid.body.constraint_rows import HELD
 from annelid.body.formulations.rods import elimination, net
 from annelid.body.formulations.rods.elimination import nested_dissection
 from annelid.config import load_config
+from annelid.errors import RunFileError
 from annelid.morphology import Array
 from annelid.simulation.worm import WormPlant
 
@@ -93,6 +94,8 @@ def test_a_worm_moves_the_same_in_any_order(pins: str, monkeypatch: pytest.Monke
     theirs = moved()
     assert not np.array_equal(ours.qpos, theirs.qpos)
     np.testing.assert_allclose(ours.coordinates, theirs.coordinates, atol=1e-7)
+    with pytest.raises(RunFileError, match="orders the worm's bodies otherwise"):
+        ours.set_state(theirs.get_state())
     assert np.ptp(ours.observe().ring_length_m) > 0.1, "it must have moved"
     # A model that is no plant's is where the plant is in the coordinates that a run records.
     model = compile_spec(build_spec(ours._config))

@@ -109,7 +109,7 @@ def test_a_clock_that_changes_while_it_runs_starts_from_rest() -> None:
         running.advance()
     going = adjusted(running, config, finer)
     assert isinstance(going.plant, WormPlant)
-    assert np.array_equal(going.plant.mechanics.get_state()["position_before"], going.plant.qpos)
+    assert np.array_equal(going.plant.mechanics.get_state()["qpos_before"], going.plant.qpos)
 
 
 def test_soft_crossings_do_not_shake() -> None:

@@ -74,6 +74,8 @@ class Anatomy:
         rest_stretch_m: Lengths of the stretch sensors at rest, m, ``(n_segments, n_sensors)``.
         objects: What moves in a scene.
         total_mass_kg: Mass of the worm.
+        body_order: The model's own number of each body of the worm, in the order of a written model, ``(n_bodies,)``;
+            empty where it has that order.
         first_act: The engine's actuator states before the first step, ``(n_states,)``.
         elasticity: The energy that joints and springs store.
         energy_meter: What a physics step does, in work.
@@ -98,7 +100,8 @@ class Anatomy:
         if model.nflex:
             slide = model.body_dofadr[self.crossing_body][:, np.newaxis] + np.arange(3)
             self._crossing_dof = slide.astype(np.intp)
-        self._written: NDArray[np.intp] = _written_order(model)
+        self.body_order = _body_order(model)
+        self._written = _coordinates_of(model, self.body_order)
         self.ring_path = np.stack([self._path_of(model.tendon(name).id) for name in self.muscle_names])
         mass = np.where(in_scene(model), 0.0, model.body_mass)
         self.total_mass_kg = float(mass.sum())
@@ -183,13 +186,17 @@ class Anatomy:
         return self._segment_rows @ by_geom, by_geom
 
 
-def _written_order(model: mujoco.MjModel) -> NDArray[np.intp]:
-    """The coordinates of the worm's own bodies in the order of a written model, where a plant's has another."""
-    if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, WRITTEN) < 0:
-        return np.empty(0, dtype=np.intp)
-    bodies = 1 + model.numeric(WRITTEN).data.astype(np.intp)
+def _body_order(model: mujoco.MjModel) -> NDArray[np.int64]:
+    """The bodies of a plant in the order of a written model, if the plant has another."""
+    is_own = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, WRITTEN) >= 0
+    return 1 + model.numeric(WRITTEN).data.astype(np.int64) if is_own else np.empty(0, dtype=np.int64)
+
+
+def _coordinates_of(model: mujoco.MjModel, bodies: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The coordinates of some bodies on slides and hinges, body by body."""
     starts, counts = model.jnt_qposadr[model.body_jntadr[bodies]], model.body_jntnum[bodies]
-    return np.concatenate([start + np.arange(count) for start, count in zip(starts, counts, strict=True)])
+    each = [start + np.arange(count) for start, count in zip(starts, counts, strict=True)]
+    return np.concatenate([np.empty(0, dtype=np.int64), *each])
 
 
 def _unit(vectors: Array) -> Array:

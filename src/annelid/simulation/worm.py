@@ -17,7 +17,7 @@ from annelid.body.worm import WormBody, worm_of
 from annelid.clock import SLACK_S, StepRatio
 from annelid.config import ArenaKind, RunConfig
 from annelid.config.answers import Walls
-from annelid.errors import SimulationStopped
+from annelid.errors import RunFileError, SimulationStopped
 from annelid.morphology import Array
 from annelid.plausibility import check, refuse_nonsense
 from annelid.protocols import SIDES, Recordable, Sensation, Signal, State, Values
@@ -413,13 +413,20 @@ class WormPlant:
             "extremes": np.array([self._edge_strain, self._pin_gap_m]),
             **{name: np.array(total) for name, total in self.energies._asdict().items()},
             **({"object_force": self._encounter.force.copy()} if self._is_scene else {}),
+            **({"body_order": self.anatomy.body_order} if self.anatomy.body_order.size else {}),
             **self.mechanics.get_state(),
             **self.touch.state(),
             **self._watch.get_state(),
         }
 
     def set_state(self, state: State) -> None:
-        """Restores what `get_state` returned; the run then continues bit for bit on the same machine."""
+        """Restores what `get_state` returned; the run then continues bit for bit on the same machine.
+
+        Raises:
+            RunFileError: The state is of a version of annelid that orders the bodies otherwise.
+        """
+        if not np.array_equal(state.get("body_order", ()), self.anatomy.body_order):
+            raise RunFileError("another version of annelid wrote it, which orders the worm's bodies otherwise")
         mujoco.mj_setState(self.model, self.data, np.asarray(state["engine"], dtype=float), STATE_PARTS)
         self.mechanics.set_state(state)
         self._control_step = int(state["control_step"][0])

@@ -24,6 +24,8 @@ LARGEST_PART = 400
 LEAST_SHARE = 0.3
 """Of the bodies, on the smaller side of a cut."""
 N_CUTS = 40
+SAME_DIGITS = 9
+"""Decimals of a place in lengths of the body: planes of one mesh are farther apart, rounding is less."""
 
 
 def elimination_order(
@@ -56,7 +58,8 @@ def elimination_order(
         together = {number[name] for name in names}
         for one in together:
             neighbours[one] |= together - {one}
-    order = nested_dissection(neighbours, place)
+    # Rounded, so that all machines find the same order: a checkpoint is in it.
+    order = nested_dissection(neighbours, np.round(place / geometry.length_m, SAME_DIGITS))
     # What every row includes is coupled to all: it goes last.
     return [HELD, *(bodies[i] for i in order[::-1] if bodies[i] != HELD)]
 
@@ -83,7 +86,7 @@ def nested_dissection(neighbours: Sequence[set[int]], place: Array) -> list[int]
 def _halves(neighbours: Sequence[set[int]], place: Array, part: set[int]) -> tuple[set[int], ...]:
     """What the smallest separator at a cut across the axis leaves of the two sides; nothing where no cut divides."""
     found = list[tuple[int, int, set[int], set[int]]]()
-    cuts = np.quantile(place[[*part]], np.linspace(LEAST_SHARE, 1.0 - LEAST_SHARE, N_CUTS))
+    cuts = np.quantile(place[[*part]], np.linspace(LEAST_SHARE, 1.0 - LEAST_SHARE, N_CUTS), method="lower")
     for cut in np.unique(cuts).tolist():
         ahead = {vertex for vertex in part if place[vertex] <= cut}
         for side, other in ((ahead, part - ahead), (part - ahead, ahead)):

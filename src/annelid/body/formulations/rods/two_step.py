@@ -23,7 +23,6 @@ import mujoco
 import numpy as np
 
 from annelid.body.formulations.rods.strains import RodStrains
-from annelid.errors import RunFileError
 from annelid.morphology import Array
 from annelid.protocols import State
 
@@ -100,19 +99,13 @@ class TwoStep:
     def get_state(self) -> State:
         """Returns what the next step depends on beside the engine's own state."""
         return {
-            "position_before": self._qpos_before.copy(),
-            "velocity_before": self._qvel_before.copy(),
+            "qpos_before": self._qpos_before.copy(),
+            "qvel_before": self._qvel_before.copy(),
             "director": self._strains.director.copy(),
         }
 
     def set_state(self, state: State) -> None:
-        """Restores what `get_state` returned, with the engine in its state already.
-
-        Raises:
-            RunFileError: An older version of annelid returned it, whose coordinates had another order.
-        """
-        if "qpos_before" in state:
-            raise RunFileError("an older version of annelid wrote it, which ordered the coordinates of rods otherwise")
-        self._qpos_before = np.array(state["position_before"], dtype=float)
-        self._qvel_before = np.array(state["velocity_before"], dtype=float)
+        """Restores what `get_state` returned, with the engine in its state already."""
+        self._qpos_before = np.array(state["qpos_before"], dtype=float)
+        self._qvel_before = np.array(state["qvel_before"], dtype=float)
         self._strains.restore(self._data.qpos, np.asarray(state["director"], dtype=float))

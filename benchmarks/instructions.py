@@ -60,13 +60,16 @@ YARDSTICK = """
 """A body of the engine's own with contacts, none of it annelid's."""
 
 
-def step_a_worm(n_segments: int) -> None:
-    """Steps a worm some times; the parent watches the engine meanwhile."""
+def step_a_worm(n_segments: int, *, own_order: bool) -> None:
+    """Steps a worm some times, or one in the engine's own order of elimination; the parent watches it meanwhile."""
     import numpy as np
 
     from annelid import load_config
+    from annelid.body.formulations.rods import net
     from annelid.simulation import WormPlant
 
+    if own_order:
+        net.elimination_order = lambda bodies, *_: bodies
     plant = WormPlant(load_config("riddle2023-rods", {"body.mesh.n_segments": n_segments}))
     plant.move(0.5 * (np.arange(plant.n_muscles) % 3 == 0), STEPS)
 
@@ -155,9 +158,10 @@ def under_callgrind(child: list[str], *options: str, **variables: str) -> list[l
         return [file.read_text(encoding="utf-8", errors="replace").splitlines() for file in files]
 
 
-def counted(n_segments: int) -> tuple[Counter[str], Counter[str]]:
+def counted(n_segments: int, *, own_order: bool) -> tuple[Counter[str], Counter[str]]:
     """Instructions of every function itself, and its calls, within all steps."""
-    (lines,) = under_callgrind(["--child", str(n_segments)], *(f"--toggle-collect={stage}" for stage in STAGES))
+    child = ["--child", str(n_segments)] + ["--own-order"] * own_order
+    (lines,) = under_callgrind(child, *(f"--toggle-collect={stage}" for stage in STAGES))
     own, calls, _ = parsed(lines)
     return own, calls
 
@@ -209,12 +213,13 @@ def parsed(lines: list[str]) -> tuple[Counter[str], Counter[str], Counter[str]]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--segments", type=int, nargs=2, default=[12, 47])
+    parser.add_argument("--own-order", action="store_true", help="eliminate bodies in the engine's own order")
     parser.add_argument("--step", action="store_true")
     parser.add_argument("--child", type=int, help=argparse.SUPPRESS)
     parser.add_argument("--loop", type=Path, help=argparse.SUPPRESS)
     given = parser.parse_args()
     if given.child:
-        step_a_worm(given.child)
+        step_a_worm(given.child, own_order=given.own_order)
         return
     if given.loop:
         step_the_loop(given.loop)
@@ -226,7 +231,7 @@ def main() -> None:
             raise SystemExit("steps of the loop are counted on x86-64 only")
         print(json.dumps({"counted_with": counted_with(), "step": counted_step()}, indent=2))
         return
-    (short, short_calls), (long, long_calls) = (counted(n) for n in given.segments)
+    (short, short_calls), (long, long_calls) = (counted(n, own_order=given.own_order) for n in given.segments)
     low, high = given.segments
     print(f"{high / low:.1f} times the length; millions of instructions and calls a step")
     print(f"{'function':34} {f'N = {low}':>8} {f'N = {high}':>8} {'times':>6} {'calls':>8} {'calls':>8}")

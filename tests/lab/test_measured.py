@@ -101,6 +101,13 @@ def test_a_drifting_clock_is_fitted_where_the_map_says_so(run: Run, tmp_path: Pa
     assert all(one.rms < 0.02 * one.amplitude[1] for one in found.signals.values())
 
 
+def test_a_log_that_shares_too_little_with_the_run_is_refused(run: Run, tmp_path: Path) -> None:
+    end_s = float(run.data["time"].values[-1])
+    for later_s, shared in ((-0.1, r"[1-9]\d?"), (5.0, "0")):
+        with pytest.raises(ConfigError, match=rf"have {shared} samples of .* in common at lag_s"):
+            agreement_of(run, log_of(run), tmp_path, lag_s=end_s + later_s)
+
+
 def test_errors_are_those_that_were_put_in(run: Run, tmp_path: Path) -> None:
     log = log_of(run)
     log["s1_mm"] = 1.5 * (log["s1_mm"] - 75.0) + 80.0

@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from annelid.analysis import nearest_time
 from annelid.body.worm import WormBody
 from annelid.config import load_config
 from annelid.draw.drawn_worm import DrawnWorm
@@ -90,6 +91,13 @@ def test_impossible_frames_are_refused(planar_run: Run, tmp_path: Path) -> None:
         with pytest.raises(RunFileError, match=says):
             render_frame(planar_run, time_s, tmp_path / name, camera=camera, background=background)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_only_frame_is_that_of_times_up_to_the_next(planar_run: Run) -> None:
+    interval_s = planar_run.config.record.frames_interval_s
+    assert nearest_time(planar_run, np.zeros(1), 0.9 * interval_s) == 0
+    with pytest.raises(RunFileError, match="recorded from 0 to 0 s"):
+        nearest_time(planar_run, np.zeros(1), 1.1 * interval_s)
 
 
 def test_impossible_videos_are_refused(planar_run: Run, tmp_path: Path) -> None:

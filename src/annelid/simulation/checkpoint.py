@@ -58,8 +58,8 @@ class Checkpoint:
         for name in sorted({*ours, *theirs}):
             if name not in ours or name not in theirs:
                 found = "missing" if name in theirs else "not of this plant or controller"
-                whose = "another version of annelid, of its plant or its controller wrote it, so run it anew"
-                return f"{whose} ({name!r} is {found})"
+                reason = "another version of annelid, of its plant or its controller wrote it"
+                return f"{reason} ({name!r} is {found}); run it anew"
             own, wanted = np.asarray(ours[name]), np.asarray(theirs[name])
             if own.shape != wanted.shape or own.dtype.kind != wanted.dtype.kind:
                 return f"{name!r} is {own.dtype} of shape {own.shape}, not {wanted.dtype} of shape {wanted.shape}"

@@ -12,7 +12,7 @@ masses tied to a vertex of each strand by springs and dashpots (`annelid.body.co
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 from itertools import groupby
 from operator import itemgetter
@@ -26,7 +26,7 @@ from annelid.body.actuation import crossing_site, mark_crossing
 from annelid.body.constraint_rows import HELD, LEAST_INERTIA_KG_M2, add_held_coordinate, add_holder, add_tie
 from annelid.body.formulations import WRITTEN, Tie, densities_kg_per_m
 from annelid.body.formulations.rods.elimination import elimination_order
-from annelid.body.formulations.rods.strains import add_strains, net_stiffness, twist_name
+from annelid.body.formulations.rods.strains import add_strains, net_stiffness, twist_names
 from annelid.body.mesh import MeshBody, Strands
 from annelid.config import ArenaKind
 from annelid.errors import ConfigError
@@ -39,7 +39,7 @@ EDGE_IMPEDANCE = [0.99, 0.999, 0.001, 0.5, 2.0]
 HIDDEN_GROUP = 4
 BODIES_IN_PART = 200
 ARENA_BYTES, ARENA_BYTES_A_BODY, ARENA_BYTES_A_PAIR = 256_000_000, 20_000, 6
-"""Memory for one step: at least twice of what 3 to 96 segments use, and over a hundred times of it for three."""
+"""Memory for one step: three times of what 96 segments use, a hundred times of what three use."""
 Maker = Callable[[mujoco.MjSpec, str], object]
 """Adds one body of a name to the world."""
 SOLVER_ITERATIONS, SOLVER_TOLERANCE = 300, 1e-6
@@ -76,11 +76,14 @@ def add_rods(
     density = densities_kg_per_m(geometry, body.strands)
     bodies, names = _vertices(geometry, body, arena, tie, density)
     bodies.setdefault(HELD, add_held_coordinate)
-    hinges = [twist_names(f"strand_{strand}", density) for strand in range(geometry.n_strands)]
-    for vertices_m, names_of_hinges in zip(geometry.vertices_m, hinges, strict=True):
-        bodies |= _twist_bodies(names_of_hinges, vertices_m, body.strands, density)
+    twists = [
+        _twist_bodies(f"strand_{strand}", vertices_m, body.strands, density)
+        for strand, vertices_m in enumerate(geometry.vertices_m)
+    ]
+    for each in twists:
+        bodies |= each
     if for_plant:
-        order = elimination_order([*bodies], geometry, names, hinges)
+        order = elimination_order([*bodies], geometry, names, [[*each] for each in twists])
         number = {name: i for i, name in enumerate(order)}
         # The engine would take up to a hundred times what it uses, 15 GB for 48 segments.
         spec.memory = ARENA_BYTES + ARENA_BYTES_A_BODY * len(order) + ARENA_BYTES_A_PAIR * len(order) ** 2
@@ -100,7 +103,7 @@ def add_rods(
     for strand, (vertices_m, points) in enumerate(zip(geometry.vertices_m, names, strict=True)):
         rgba = STRAND_RGBA[strand // geometry.n_per_plane]
         rows = stiffness[:, strand] if for_plant else None
-        options = {"rgba": rgba, "density_kg_per_m": density, "stiffness_Nm": rows}
+        options = {"rgba": rgba, "density_kg_per_m": density, "stiffness_Nm": rows, "has_hinges": True}
         add_rod(spec, f"strand_{strand}", vertices_m, points, material, edge_time_constant_s, **options)
 
 
@@ -160,7 +163,7 @@ def _add_part(spec: mujoco.MjSpec, bodies: dict[str, Maker], names: list[str], p
         spec.delete(spec.find_default(f"{prefix}main"))
 
 
-def vertex_name(strand: int, vertex: int | str) -> str:
+def vertex_name(strand: int, vertex: int) -> str:
     """Name of the body of a strand's own vertex."""
     return f"vertex_{strand}_{vertex}"
 
@@ -202,6 +205,7 @@ def add_rod(
     rgba: tuple[float, float, float, float] = STRAND_RGBA[0],
     density_kg_per_m: Array | None = None,
     stiffness_Nm: Array | None = None,
+    has_hinges: bool = False,
 ) -> None:
     """Adds one discrete elastic rod through existing bodies; the rod itself touches nothing.
 
@@ -216,6 +220,7 @@ def add_rod(
         density_kg_per_m: Mass per length of every edge, ``(n_edges,)``, instead of the material's.
         stiffness_Nm: Of the rows that resist bending and twist, ``(3, n_edges - 1)``, for a plant that renews them
             (`RodStrains`); None for the engine's own elasticity, one for the whole rod.
+        has_hinges: Whether the spec has the twist hinges of its edges already.
     """
     n_edges = len(vertices_m) - 1
     if density_kg_per_m is None:
@@ -236,9 +241,8 @@ def add_rod(
     add_held_coordinate(spec)
     flex.vertbody = bodies
     flex.elem = np.stack([np.arange(n_edges), np.arange(1, n_edges + 1)], axis=-1).ravel().tolist()
-    hinges = _twist_bodies(twist_names(name, density_kg_per_m), vertices_m, strands, density_kg_per_m)
-    for hinge, add in hinges.items():
-        if spec.body(hinge) is None:
+    if not has_hinges:
+        for hinge, add in _twist_bodies(name, vertices_m, strands, density_kg_per_m).items():
             add(spec, hinge)
     spec.add_equality(
         name=name,
@@ -252,13 +256,8 @@ def add_rod(
         add_strains(spec, name, bodies, stiffness_Nm, strands.damping_time_s)
 
 
-def twist_names(rod: str, edges: Sequence[Any] | Array) -> list[str]:
-    """Names of the twist hinges of a rod, one for each of its edges."""
-    return [twist_name(rod, edge, len(edges)) for edge in range(len(edges))]
-
-
-def _twist_bodies(names: list[str], vertices_m: Array, strands: Strands, density_kg_per_m: Array) -> dict[str, Maker]:
-    """Returns what adds the bodies of the twist hinges of a rod's edges, by their names; arguments as `add_rod`.
+def _twist_bodies(rod: str, vertices_m: Array, strands: Strands, density_kg_per_m: Array) -> dict[str, Maker]:
+    """Returns what adds the bodies of the twist hinges of a named rod's edges; arguments as `add_rod`.
 
     Raises:
         ConfigError: An edge is too light for the engine.
@@ -275,6 +274,7 @@ def _twist_bodies(names: list[str], vertices_m: Array, strands: Strands, density
         holder = add_holder(spec, name, TWIST_MASS_KG, inertia)
         holder.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=AXES[0])
 
+    names = twist_names(rod, len(inertias))
     return {name: partial(add, inertia=inertia) for name, inertia in zip(names, inertias.tolist(), strict=True)}
 
 

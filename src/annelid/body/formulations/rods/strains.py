@@ -47,6 +47,11 @@ def twist_name(rod: str, edge: int, n_edges: int) -> str:
     return f"{rod}_twist" if edge == n_edges - 1 else f"{rod}_twist_{edge}"
 
 
+def twist_names(rod: str, n_edges: int) -> list[str]:
+    """Names of the twist hinges of a rod, edge by edge."""
+    return [twist_name(rod, edge, n_edges) for edge in range(n_edges)]
+
+
 def strain_name(rod: str, vertex: int, mode: str) -> str:
     """Name of the tendon, and of the row, of one mode of a vertex."""
     return f"{rod}_{vertex}_{mode}"
@@ -154,7 +159,7 @@ class RodStrains:
         self._vertices = RodVertices(model)
         n_edges = int(model.flex_edgenum[0])
         rods = [f"strand_{rod}" for rod in range(model.nflex)]
-        hinges = [[model.joint(twist_name(rod, edge, n_edges)).id for edge in range(n_edges)] for rod in rods]
+        hinges = [[model.joint(name).id for name in twist_names(rod, n_edges)] for rod in rods]
         self._hinge = model.jnt_qposadr[np.array(hinges)].astype(np.intp)
         names = [[[strain_name(rod, v, mode) for mode in MODES] for v in range(1, n_edges)] for rod in rods]
         self._stiffness = np.ascontiguousarray(np.moveaxis(stiffness_Nm, 0, -1))
